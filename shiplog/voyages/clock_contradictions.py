@@ -24,7 +24,7 @@ from shiplog.units import SECOND_NS
 from shiplog.voyages import clocks
 from shiplog.voyages.clocks import EARLY_S, LATEST_S, RECORDER, Clock
 
-HOUR_S = 3600.0
+HOUR_S, DAY_S = 3600.0, 86_400.0
 ONE_OFFSET_S = 0.3  # two statements of one clock's offset differ by what it jitters
 PACE = 0.1  # of a voyage's length: a recorder whose clock ran otherwise wrote a replay
 
@@ -72,10 +72,11 @@ def agreed(reading: Reading, profile: Profile) -> Agreed:
 
 def untold(health: Sequence[Finding], own: Sequence[Finding]) -> list[Finding]:
     """What a log's reader found, but for differences of clocks of which ingest says more: that they
-    were taken out, or that they contradict each other."""
+    were taken out, or that they contradict each other. Of days apart the reader says the dates."""
     sizes = [
         abs(one.value) for one in own
-        if one.value is not None and (one.kind == "clock_offset" or one.reason == "clock")
+        if one.value is not None and abs(one.value) < DAY_S
+        and (one.kind == "clock_offset" or one.reason == "clock")
     ]  # fmt: skip
     return [
         one for one in health
