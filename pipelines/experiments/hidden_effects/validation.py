@@ -21,6 +21,7 @@ from pipelines.experiments.hidden_effects import (
     scores,
 )
 from pipelines.experiments.hidden_effects.score import FAILED, LEVEL, Answer, Score, attempt
+from shiplog.diagnosis.thresholds import STATED
 from shiplog.exceptions import ShiplogError, listed
 from shiplog.numbers import counted
 from shiplog.report import tables
@@ -237,11 +238,23 @@ def _head(found: Sequence[Score], answers: Sequence[Answer], of: str) -> str:
     if trained and trained != (of,):
         lines.append("- models identified by another version than that which diagnosed")
     lines.append(_attempts(answers))
+    if unsure := [a for a in answers if _unsure_none(a)]:
+        right = sum(a.right for a in unsure)
+        lines.append(
+            f"- {len(unsure)} of the answers `none` have a probability below {STATED:g}, {right} "
+            "of them\n  right; since these answers were made, such a one is `undecided`"
+        )
     if of == program.UNRECORDED:
         lines.append("- which version of the program it was is not recorded")
     elif of.endswith("+changes"):
         lines.append("- the program held changes that no version has")
     return "\n".join(lines)
+
+
+def _unsure_none(answer: Answer) -> bool:
+    """Whether "nothing is wrong" was said with less than what is now asked for."""
+    ranking = {one["name"]: one["probability"] for one in answer.verdict.get("ranking") or ()}
+    return answer.verdict.get("verdict") == "none" and ranking.get("none", 1.0) < STATED
 
 
 def _attempts(answers: Sequence[Answer]) -> str:
