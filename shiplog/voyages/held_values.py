@@ -78,7 +78,7 @@ def held(
         course = course_over_ground.course(sampled, speed, position, keel, profile)
         if course is None:
             return []
-        shortest = 0.5 * course.seconds / samples.period_s
+        shortest = course.seconds / samples.period_s  # a shorter stretch has no course of its own
         long = np.array([last - first + 1 >= shortest for first, last in runs], bool)
         runs = [run for run, is_long in zip(runs, long, strict=True) if is_long]
         return kept(runs, course.angle[:, None], least[long] + course.swing)
