@@ -18,8 +18,8 @@ JOINED, APART = 0.4, 0.65  # unexplained share: less, and two go together; more,
 BETTER, CLEARLY = 3.0, 0.02  # another formula leaves so many times less, and so much less
 BETTER_OFF = 2.0  # the same where it goes ahead by the other formula, and athwart by this one
 GUARD = 1.5  # half 90 % intervals between an estimate and what is no contradiction
-# Share that the heading as it is leaves, and less: it is not a mirrored one. One in radians, which
-# hardly changes, may leave less than that: then the way has to go ahead by it, too.
+# Share that the heading as it is leaves, and less: it is not another one. On a nearly straight
+# course it may be all the same, where the ship goes ahead by the other one and not by this.
 LEAST_MIRRORED = 0.1
 ALONG_DEG = 45.0  # from the bow: the ship goes ahead
 NEAR_DEG = 8.0  # of 90 or 180 deg
@@ -193,7 +193,8 @@ def _way(j: Joined) -> Way | None:
         best = "as it is"
     if left[best] > JOINED:
         return None
-    if best != "as it is" and left["as it is"] < LEAST_MIRRORED and not in_radians:
+    ahead = pairs.natural(j.fits[best]) and (in_radians or not pairs.natural(j.fits["as it is"]))
+    if best != "as it is" and left["as it is"] < LEAST_MIRRORED and not ahead:
         return None
     sense = left.get("mirrored", 1.0) > BETTER * left[best] if best != "mirrored" else True
     _, angle, _, half = j.fits[best].polar()

@@ -43,6 +43,8 @@ def held(
     NaN where it is not known.
     """
     runs = fault_detection.repeats(samples.value)
+    if not runs:
+        return []
     around = fault_detection.steps_around(samples.value, runs) if name in COUNTED else 0.0
     if name == "position" and profile.sensors.kind(name) == "geodetic":
         around = around * METRE
@@ -57,11 +59,15 @@ def held(
     ) -> list[tuple[int, int]]:
         return fault_detection.held_on_grid(times, samples.time, runs, travel, least, drift)
 
+    if name == "wind":  # nothing to compare it with; a calm is none
+        return kept(
+            _moving(fault_detection.improbable(runs, len(samples.time)), samples), None, 0.0
+        )
     speed, turning = np.nan_to_num(over_ground), np.nan_to_num(columns["yaw_rate"])[:, None]
-    gone = np.cumsum(speed, axis=0) * STEP_S
-    turned = np.cumsum(turning, axis=0) * STEP_S
     if name == "position":
+        gone = np.cumsum(speed, axis=0) * STEP_S
         return kept(runs, gone, least, _bias(sampled["velocity"], speed))
+    turned = np.cumsum(turning, axis=0) * STEP_S
     if name == "heading" and profile.sensors.yaw_rate is not None:
         drift = _bias(sampled["yaw_rate"], turning)
         off = _unwrapped(columns["heading"]) - turned[:, 0]
@@ -83,11 +89,11 @@ def held(
         runs = [run for run, is_long in zip(runs, long, strict=True) if is_long]
         return kept(runs, course.angle[:, None], least[long] + course.swing)
     runs = fault_detection.improbable(runs, len(samples.time))
-    rest = np.all(np.abs(samples.value) <= samples.resolution, axis=1)
-    moving = [run for run in runs if not rest[run[0]]]
-    if name == "wind":  # nothing to compare it with; a calm is none
-        return kept(moving, None, 0.0)
+    if not runs:
+        return []
+    moving = _moving(runs, samples)
     if name == "velocity":
+        gone = np.cumsum(speed, axis=0) * STEP_S
         other, off, bias = sampled["position"], position - gone, _bias(samples, speed)
     else:
         other, off = sampled["heading"], _unwrapped(columns["heading"])[:, None] - turned
@@ -97,6 +103,12 @@ def held(
     by_noise = 2.0 * other.noise * math.sqrt(math.log(max(len(samples.time), 1) / ACCIDENT))
     shown = kept(unsure, off, by_noise + other.resolution, bias)
     return sorted(kept(sure, None, 0.0) + shown)
+
+
+def _moving(runs: list[tuple[int, int]], samples: Samples) -> list[tuple[int, int]]:
+    """Runs whose value is no rest."""
+    rest = np.all(np.abs(samples.value) <= samples.resolution, axis=1)
+    return [run for run in runs if not rest[run[0]]]
 
 
 def _by_chance(

@@ -170,7 +170,8 @@ def ordered(
     """
     finite = np.isfinite(value).all(axis=1)
     unmeasured, time, value = np.sort(time[~finite]), time[finite], value[finite]
-    blank = np.setdiff1d(unmeasured, time)
+    blank = unmeasured[np.diff(unmeasured, prepend=-1) > 0] if len(unmeasured) else unmeasured
+    blank = blank[~np.isin(blank, time)] if len(blank) else blank
     spread = bursts.spread(time, value)
     order = np.argsort(spread.time, kind="stable")
     time, value = spread.time[order], value[order]

@@ -49,6 +49,7 @@ def test_what_is_changed_is_stored_right_or_named(change, recorder):
 FOUND = {
     5135: "a heading reversed on a nearly straight course was blamed on the propeller",
     5170: "a heading in radians on a nearly straight course hardly changes",
+    20744: "a heading anticlockwise on a nearly straight course was blamed on the propeller",
     7023: "the same of a large ship at dead slow, beside a position of 1e-6 deg",
     7046: "revolutions per minute of a ferry that sails stern first",
     7067: "latitude and longitude exchanged, far from the profile's datum",
@@ -56,6 +57,7 @@ FOUND = {
     7219: "a heading frozen for 200 s, and the way swings by 20 deg",
     9514: "a heading that is 90 deg off, of a ship whose course bends by a few tens of degrees",
     5033: "sound: a noisy heading in 0.1 deg comes to the same number twice",
+    20263: "sound: a heading repeats for less than a course is averaged over",
     7070: "sound: the same without a gyro, beside a noisy position",
     5049: "sound: a delay of 4 s explained the noise of a second, and no way of a minute",
     9745: "sound: a velocity in steps of 0.05 m/s at anchor",
