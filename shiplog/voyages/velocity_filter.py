@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.signal import lfilter
 
 MORE = 1.5  # times what the first order takes: filters of a higher order, and what noise adds
 
@@ -25,6 +24,8 @@ def takes(velocity: np.ndarray, late: float, step: float) -> float:
 
     step  s between rows
     """
+    from scipy.signal import lfilter  # 0.7 s to load, and few records ask for it
+
     delay = round(late / step)
     if delay < 1 or len(velocity) < 4 * delay:
         return 0.0
