@@ -258,6 +258,15 @@ class Actuator(Source):
         return self
 
     @property
+    def si_limits(self) -> tuple[float, float] | None:
+        """Its limits in SI, the lower one first; None where the profile states none."""
+        if self.limits is None:
+            return None
+        offset, factor = self.scale()[0]
+        low, high = sorted((limit - offset) * factor for limit in self.limits)
+        return low, high
+
+    @property
     def circular(self) -> bool:
         """An azimuth turns through ±180°; a rudder never does."""
         return self.kind == "azimuth"

@@ -231,13 +231,8 @@ def _ranges(record: Record) -> list[np.ndarray]:
     """Settings to try of each actuator: its stops, or its measured extremes."""
     found = []
     for i, actuator in enumerate(record.profile.actuators):
-        offset, factor = actuator.scale()[0]
         far = float(np.abs(record.actuator[:, i]).max(initial=0.0))
-        low, high = (
-            sorted((limit - offset) * factor for limit in actuator.limits)
-            if actuator.limits
-            else (-far, far)
-        )
+        low, high = actuator.si_limits or (-far, far)
         if actuator.kind == "azimuth":
             low, high = -math.pi, math.pi
         drives = actuator.kind in ("propeller", "thruster")

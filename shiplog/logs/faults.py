@@ -31,7 +31,7 @@ LATE_WORDS = {  # of a topic that came late, while others did not
     ("publish_time", "stamp"): "published {} after the time that they bear",
     ("log_time", "stamp"): "recorded {} after the time that they bear",
 }
-LATEST_S = 1.5  # of a receiver's latency; 1.06 s have been measured
+LATEST_S = 1.5  # of a receiver's latency; 1.06 s have been measured (PCOD of R/V Palmer)
 ALIKE = 0.25  # of an offset: what another one differs by, and is the same one
 PACE = 0.1  # of the recorder's: publish times that run otherwise are of the writing of a file
 LATE_PUBLISH_NS = 60 * SECOND_NS  # nothing is published so long after it was recorded
@@ -170,16 +170,16 @@ def repeats(topic: str, frame: pl.DataFrame, first: int, again: list[int]) -> li
     return findings
 
 
-def clocks(frames: Mapping[str, pl.DataFrame], told: Iterable[Finding] = ()) -> list[Finding]:
+def clocks(frames: Mapping[str, pl.DataFrame], reported: Iterable[Finding] = ()) -> list[Finding]:
     """Steady offsets between the recorder's, the publishers' and the messages' own clocks.
 
     A clock is that of all its topics. Where some are late by no more than a receiver's latency and
     others are not, it is said of their messages and of no clock.
 
-    told  what is known of the log's clocks already: an offset of that size is not said again
+    reported  of the log's clocks already: an offset of that size is not reported again
     """
     findings = []
-    known = [f.value for f in told if f.kind == "clock_offset" and f.value is not None]
+    known = [f.value for f in reported if f.kind == "clock_offset" and f.value is not None]
     written = {topic for topic, frame in frames.items() if not of_publishers(frame)}
     for ahead, behind, one, other in CLOCK_PAIRS:
         steady: dict[str, float] = {}

@@ -187,9 +187,8 @@ def _health(tables: Tables, tally: Tally, frames: Mapping[str, pl.DataFrame]) ->
     missing: int | None = None if damaged else 0
     if found.statistics is not None:
         missing = max(found.statistics.message_count - count, 0)
-    lost = (
-        None if missing is None else missing + broken
-    )  # what does not fit its schema is lost, too
+    # what does not fit its schema is lost, too
+    lost = None if missing is None else missing + broken
     topics = {number: channel.topic for number, channel in found.channels.items()}
     findings = faults.losses(found.losses, tally.first, missing, topics)
     findings += faults.appended(found.sections)
@@ -201,11 +200,11 @@ def _health(tables: Tables, tally: Tally, frames: Mapping[str, pl.DataFrame]) ->
     twice = salvage.repeated(found.path, suspects) if suspects else {}
     for topic, frame in frames.items():
         findings += faults.repeats(topic, frame, tally.first or 0, twice.get(topic, []))
-    told = stored_findings.of_record(found.metadata)
-    findings += faults.clocks(frames, told)
+    stored = stored_findings.of_record(found.metadata)
+    findings += faults.clocks(frames, stored)
     noted = {channel.topic: channel.metadata for channel in found.channels.values()}
     findings += dates.impossible(frames, noted)
-    findings += told
+    findings += stored
     whole = found.statistics is not None and lost == 0 and not damaged and not found.unvouched
     return Health(
         "fast" if whole else "salvage", count, lost, found.chunks, found.chunks_lost,

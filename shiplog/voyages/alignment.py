@@ -16,6 +16,7 @@ from shiplog.logs.read import Reading
 from shiplog.logs.senders import Senders
 from shiplog.profile import Actuator, Profile, Sensor
 from shiplog.voyages import (
+    actuator_limits,
     clocks,
     datum,
     empty_course,
@@ -103,7 +104,7 @@ def aligned(reading: Reading, profile: Profile, sent: Mapping[str, Senders]) -> 
     if timed.contradicted:
         grid.marks |= int(Quality.BLANK)
         grid.findings = [f for f in grid.findings if f.kind not in ("gap", "blank")]
-    grid.findings = status.untold(grid.findings, reading.health.findings, profile)
+    grid.findings = status.unreported(grid.findings, reading.health.findings, profile)
     grid.findings.sort(key=lambda f: (f.start_s is None, f.start_s or 0.0))
     table = pl.DataFrame(
         {"time": grid.times}
@@ -174,13 +175,5 @@ def _actuator(grid: VoyageGrid, actuator: Actuator, samples: resampling.Samples)
     placed = grid.place(actuator.name, samples)
     column = np.arctan2(placed[:, 1], placed[:, 0]) if actuator.circular else placed[:, 0]
     grid.columns[actuator.name] = column
-    if actuator.limits is None:
-        return
-    offset, factor = actuator.scale()[0]
-    low, high = sorted((limit - offset) * factor for limit in actuator.limits)
-    slack = 1e-3 * (high - low)
-    if actuator.circular:  # limits of 0 to 360 deg are all there is, wherever the angle is cut
-        beyond = np.mod(column - low + slack, 2.0 * np.pi) > high - low + 2.0 * slack
-    else:
-        beyond = (column < low - slack) | (column > high + slack)
+    beyond = actuator_limits.beyond(actuator, column)
     grid.note(beyond, Quality.LIMITS, "limits", actuator.name, "stands beyond its limits")

@@ -17,12 +17,13 @@ import polars as pl
 
 from shiplog.exceptions import listed
 from shiplog.logs import dates, leap_seconds
+from shiplog.logs.faults import LATEST_S
 from shiplog.logs.health_report import Finding
 from shiplog.logs.read import Reading
 from shiplog.profile import Profile
 from shiplog.units import SECOND_NS
 from shiplog.voyages import clocks
-from shiplog.voyages.clocks import EARLY_S, LATEST_S, RECORDER, Clock
+from shiplog.voyages.clocks import EARLY_S, RECORDER, Clock
 
 HOUR_S, DAY_S = 3600.0, 86_400.0
 ONE_OFFSET_S = 0.3  # two statements of one clock's offset differ by what it jitters
@@ -70,7 +71,7 @@ def agreed(reading: Reading, profile: Profile) -> Agreed:
     return Agreed(replace(reading, frames=frames), findings, frozenset(contradicted))
 
 
-def untold(health: Sequence[Finding], own: Sequence[Finding]) -> list[Finding]:
+def unreported(health: Sequence[Finding], own: Sequence[Finding]) -> list[Finding]:
     """What a log's reader found, but for differences of clocks of which ingest says more: that they
     were taken out, or that they contradict each other. Of days apart the reader says the dates."""
     sizes = [

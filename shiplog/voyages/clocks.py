@@ -13,7 +13,7 @@ import polars as pl
 
 from shiplog.exceptions import listed
 from shiplog.logs import dates
-from shiplog.logs.faults import of_publishers
+from shiplog.logs.faults import LATEST_S, of_publishers
 from shiplog.logs.health_report import Finding
 from shiplog.logs.read import Reading
 from shiplog.profile import Profile, Source
@@ -29,7 +29,6 @@ COLUMNS = {  # of a source: the column of its clock, and the one that it is held
 # Topics of one clock are recorded with delays that differ by less; and a clock whose distance from
 # the recorder's scatters by more says nothing of another clock's.
 ONE_CLOCK_NS = 1.0 * SECOND_NS
-LATEST_S = 1.5  # of a receiver's latency; 1.06 s have been measured (PCOD of R/V Palmer)
 EARLY_S = 0.05  # as much before 0 is rounding of the stamps, not a clock
 
 

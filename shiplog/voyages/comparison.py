@@ -54,7 +54,7 @@ def compare(table: pl.DataFrame, profile: Profile) -> Comparison:
     return Comparison(gross, fine.estimates, found, tuple(left))
 
 
-def beside(of_rows: Iterable[Finding], found: Iterable[Finding]) -> list[Finding]:
+def without_consequences(of_rows: Iterable[Finding], found: Iterable[Finding]) -> list[Finding]:
     """What was found row by row, but for what a contradicted channel makes of another one: a yaw
     rate that is 60 times too large holds the heading, and steps beside it."""
     wrong = {one.channel for one in found if one.kind == "contradiction"}

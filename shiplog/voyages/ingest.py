@@ -72,9 +72,9 @@ def build(reading: Reading, profile: Profile, sent: Mapping[str, Senders] | None
         rows=table.height,
         seconds=round(grid.seconds, 3),
         findings=(
-            *clock_contradictions.untold(reading.health.findings, aligned.left_out),
+            *clock_contradictions.unreported(reading.health.findings, aligned.left_out),
             *aligned.left_out,
-            *comparison.beside(grid.findings, compared.findings),
+            *comparison.without_consequences(grid.findings, compared.findings),
             *compared.findings,
         ),
         usable_s=usable_s,

@@ -135,8 +135,7 @@ def _units(profile: Profile) -> list[Asked]:
 
 def _reach(actuator: Actuator) -> float:
     """The larger of its limits from zero, in SI."""
-    offset, factor = actuator.scale()[0]
-    return max(abs((limit - offset) * factor) for limit in actuator.limits or (offset,))
+    return max(map(abs, actuator.si_limits or (0.0,)))
 
 
 def _arm(actuator: Actuator) -> float:

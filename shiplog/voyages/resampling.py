@@ -249,11 +249,11 @@ def onto(times: np.ndarray, samples: Samples) -> OnGrid:
     spike = usable & (
         (samples.spike[left] & (share < 1.0)) | (samples.spike[right] & (share > 0.0))
     )
-    blank = ~usable & (_near(times, samples.blank) | _beside_blank(times, samples))
+    blank = ~usable & (_near(times, samples.blank) | _next_to_blank(times, samples))
     return OnGrid(value, ~usable & ~blank, blank, spike)
 
 
-def _beside_blank(times: np.ndarray, samples: Samples) -> np.ndarray:
+def _next_to_blank(times: np.ndarray, samples: Samples) -> np.ndarray:
     """Which grid times [m] lie between two messages no further apart than the tolerance, of which
     one has no value: nothing was lost there, it was not measured."""
     if len(samples.blank) == 0:

@@ -56,12 +56,12 @@ def goes_on(time: np.ndarray, value: np.ndarray) -> bool:
     long = steps > LONG * typical
     at = np.flatnonzero(long[1:-1] & ~long[:-2] & ~long[2:]) + 1
     change = np.linalg.norm(np.diff(value, axis=0), axis=1)
-    beside = 0.5 * (change[at - 1] + change[at + 1])
-    at, beside = at[beside > 0.0], beside[beside > 0.0]
+    neighbouring = 0.5 * (change[at - 1] + change[at + 1])
+    at, neighbouring = at[neighbouring > 0.0], neighbouring[neighbouring > 0.0]
     if len(at) == 0:
         return False
     times = float(np.median(steps[at])) / typical
-    return float(np.median(change[at] / beside)) > 0.5 * (1.0 + times)
+    return float(np.median(change[at] / neighbouring)) > 0.5 * (1.0 + times)
 
 
 def _coarse(steps: np.ndarray) -> float:

@@ -157,11 +157,13 @@ def heeded(reading: Reading, profile: Profile) -> tuple[Reading, list[LeftOut]]:
     return replace(reading, frames=frames), refused
 
 
-def untold(found: Sequence[Finding], told: Sequence[Finding], profile: Profile) -> list[Finding]:
-    """Findings of the grid without the blank stretches that the log's conversion told of, topic by
+def unreported(
+    found: Sequence[Finding], reported: Sequence[Finding], profile: Profile
+) -> list[Finding]:
+    """Findings of the grid without the blank stretches that the log's conversion reported, topic by
     topic, as what the instrument itself calls no measurement."""
     stretches: dict[str, list[tuple[float, float]]] = {}
-    for one in told:
+    for one in reported:
         if one.kind == "status" and one.start_s is not None and one.end_s is not None:
             stretches.setdefault(one.channel, []).append((one.start_s, one.end_s))
     topics = {getattr(source, "name", name): source.topic for name, source in sources(profile)}

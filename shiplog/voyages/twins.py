@@ -15,12 +15,12 @@ import polars as pl
 
 from shiplog.logs.health_report import Finding, NotCompared
 from shiplog.profile import Actuator, Profile
+from shiplog.voyages.actuator_limits import beyond
 from shiplog.voyages.contradictions_actuators import Driven
 from shiplog.voyages.resampling import RATE_HZ
 
 MIRRORED = 0.02  # of the ship's length: by how much their places may differ from a mirror's
 ALIKE = 0.01  # of the range in which they move: the two always stand alike
-SLACK = 1e-3  # of a range: beyond its limits
 BEYOND_ROWS = 30  # 3 s of 10 Hz rows, and more, beyond limits
 WITHIN = 0.99  # of the rows within the other's limits
 
@@ -87,31 +87,17 @@ def by_limits(table: pl.DataFrame, profile: Profile) -> list[Finding]:
 def _exchanged_s(pair: Sequence[Actuator], values: Sequence[np.ndarray]) -> float:
     """For how long [s] the two stand beyond their own limits where each fits the other's; else
     0."""
-    own, theirs = (_limits(one) for one in pair)
-    if own is None or theirs is None or own == theirs:
+    own, theirs = pair
+    if own.si_limits is None or theirs.si_limits is None or own.si_limits == theirs.si_limits:
         return 0.0
     first, second = (one[np.isfinite(one)] for one in values)
-    beyond = _beyond(first, own), _beyond(second, theirs)
-    if min(beyond) < BEYOND_ROWS:
+    excess = int(beyond(own, first).sum()), int(beyond(theirs, second).sum())
+    if min(excess) < BEYOND_ROWS:
         return 0.0
-    exchanged = (_beyond(first, theirs), len(first)), (_beyond(second, own), len(second))
-    if any(rows > (1.0 - WITHIN) * size for rows, size in exchanged):
+    exchanged = beyond(theirs, first), beyond(own, second)
+    if any(rows.mean() > 1.0 - WITHIN for rows in exchanged):
         return 0.0
-    return max(beyond) / RATE_HZ
-
-
-def _limits(actuator: Actuator) -> tuple[float, float] | None:
-    """In SI, least first."""
-    if actuator.limits is None:
-        return None
-    offset, factor = actuator.scale()[0]
-    low, high = sorted((limit - offset) * factor for limit in actuator.limits)
-    return low, high
-
-
-def _beyond(values: np.ndarray, limits: tuple[float, float]) -> int:
-    slack = SLACK * (limits[1] - limits[0])
-    return int(((values < limits[0] - slack) | (values > limits[1] + slack)).sum())
+    return max(excess) / RATE_HZ
 
 
 def _stand_alike(one: np.ndarray, other: np.ndarray) -> bool:

@@ -37,7 +37,7 @@ NEAR = 0.15  # share by which β may be off a known one: the hull's flow, and gu
 # four standard errors where these are many, and seven of nine blocks.
 SURE, NINETY = 1.0 - 3e-5, 0.95
 TURNED = math.radians(45.0)  # of the vane's zero, and more: no hull turns the air so far
-SLOW, FASTER = "the ship is slow beside the gusts", "changes of a higher speed, or less wind"
+SLOW, FASTER = "the ship is slow compared with the gusts", "changes of a higher speed, or less wind"
 UNIT_OPEN = NotCompared("the wind's unit", SLOW, FASTER)
 ZERO_OPEN = NotCompared("whether the wind blows from or to, and the vane's zero", SLOW, FASTER)
 

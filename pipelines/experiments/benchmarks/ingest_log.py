@@ -1,6 +1,6 @@
-"""How fast a long log becomes a voyage, beside another build of shiplog, and in how much memory.
+"""How fast a long log becomes a voyage, compared with another build of shiplog, and its memory.
 
-    python -m pipelines.experiments.benchmarks.ingest_log [--hours 8] [--beside OTHER/bin/python]
+    python -m pipelines.experiments.benchmarks.ingest_log [--hours 8] [--baseline OTHER/bin/python]
 
 The sample voyage over and over. The builds take turns, each round in a process of its own with the
 start of Python included; the figures are medians of processor time, the ratio that of the rounds.
@@ -28,7 +28,7 @@ from shiplog.voyages.ingest import ingest
 voyage = ingest(Path(sys.argv[1]), profile_file.load("esso-vectwin"))
 print(voyage.report.messages_read)
 """
-LEAST_RATIO = 0.9  # of the other build's messages a second
+LEAST_RATIO = 0.9  # of the baseline's messages a second
 
 
 def ingested(python: Path, path: Path) -> tuple[int, float, float]:
@@ -49,11 +49,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--hours", type=float, default=8.0)
     parser.add_argument("--rounds", type=int, default=ROUNDS)
-    parser.add_argument("--beside", type=Path, help="Python of an environment of another build")
+    parser.add_argument("--baseline", type=Path, help="Python of an environment of another build")
     given = parser.parse_args()
     pythons = {"this build": Path(sys.executable)}
-    if given.beside is not None:
-        pythons["the other"] = given.beside.absolute()
+    if given.baseline is not None:
+        pythons["the baseline"] = given.baseline.absolute()
     times: dict[str, list[float]] = {name: [] for name in pythons}
     memory: dict[str, float] = dict.fromkeys(pythons, 0.0)
     count = 0
@@ -75,10 +75,10 @@ def main() -> None:
             f"{name}: {count} messages in {middle:.2f} s of processor time ({range_}), "
             f"{count / middle / 1e3:.0f}k messages/s, at most {memory[name]:.0f} MB"
         )
-    if given.beside is not None:
-        pairs = zip(times["the other"], times["this build"], strict=True)
+    if given.baseline is not None:
+        pairs = zip(times["the baseline"], times["this build"], strict=True)
         ratios = sorted(other / own for other, own in pairs)
-        print(f"messages a second over the other build's: {statistics.median(ratios):.2f} "
+        print(f"messages a second over the baseline's: {statistics.median(ratios):.2f} "
               f"({ratios[0]:.2f} to {ratios[-1]:.2f}); goal {LEAST_RATIO}")  # fmt: skip
 
 

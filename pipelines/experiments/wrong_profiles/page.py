@@ -29,8 +29,8 @@ are those that a new user tried. The sample logs are read through it in three wa
   through the wrong one (`tests/experiments/test_wrong_profiles.py`).
 
 The first two are named before any model is trained, with the key of the profile to change. The
-class depends on the voyage: a ship that is fast beside the gusts shows the unit of its wind, the
-model ship of the sample logs does not. The machine: {cores} cores ({machine}).
+class depends on the voyage: a ship that is fast compared with the gusts shows the unit of its wind,
+the model ship of the sample logs does not. The machine: {cores} cores ({machine}).
 """
 INGESTED = """
 ## What ingest says

@@ -18,9 +18,10 @@ import numpy as np
 
 from shiplog.logs.conversion.clock import DAY_NS
 from shiplog.logs.conversion.nmea_utc import ROLLOVER_DAYS, Resolved
+from shiplog.logs.faults import LATEST_S
 from shiplog.units import SECOND_NS, YEAR_2000_NS
 
-LATENCY_NS = int(1.5 * SECOND_NS)  # the most that is taken for a receiver's
+LATENCY_NS = int(LATEST_S * SECOND_NS)  # the most that is taken for a receiver's
 SMALL_NS = SECOND_NS // 2  # most receivers are faster
 EARLY_NS = -SECOND_NS // 10  # a stamp so much before its own UTC is still jitter
 STEP_NS = SECOND_NS // 4  # of the recorder's clock, that is told from jitter of the latency
