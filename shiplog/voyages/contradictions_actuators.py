@@ -19,9 +19,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from shiplog.profile import Actuator
+from shiplog.voyages import moving
 from shiplog.voyages.contradictions_regression import regress
 from shiplog.voyages.contradictions_track import ROWS, STEP_S, Track, Windows
 
@@ -229,7 +229,7 @@ def _counted(
 
 def _averaged(velocity: np.ndarray, seconds: int) -> np.ndarray:
     """Velocity [B], each second the mean of those around it, over a share of a window."""
-    return uniform_filter1d(velocity, max(round(AVERAGED * seconds), 1), mode="nearest")
+    return moving.mean(velocity, max(round(AVERAGED * seconds), 1))
 
 
 def _at(

@@ -10,9 +10,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from shiplog.profile import Profile
+from shiplog.voyages import moving
 from shiplog.voyages.resampling import STEP_NS, Samples
 
 STEP_S = STEP_NS * 1e-9
@@ -59,7 +59,7 @@ def _of_velocity(samples: Samples, velocity: np.ndarray, profile: Profile) -> _W
     rows = 2 * round(0.5 * seconds / STEP_S) + 1
     if seconds > COURSE_S or len(velocity) < rows:
         return None
-    return _Way(uniform_filter1d(velocity, rows, axis=0, mode="nearest"), seconds, 0.0)
+    return _Way(moving.mean(velocity, rows), seconds, 0.0)
 
 
 def _of_position(samples: Samples, position: np.ndarray, profile: Profile) -> _Way | None:

@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
+from numpy.lib.stride_tricks import sliding_window_view
 
 from shiplog.channels import Quality
 from shiplog.logs.health_report import Finding
+from shiplog.voyages import moving
 from shiplog.voyages.resampling import STEP_NS
 
 LISTED = 20  # stretches of one kind on one channel that are listed one by one; the rest is counted
@@ -145,19 +146,21 @@ def steps_around(value: np.ndarray, runs: list[tuple[int, int]]) -> np.ndarray:
     amount before and after.
     """
     found = np.zeros(len(runs))
+    first = np.array([a for a, _ in runs], np.int64)
     for column in value.T:
         changes = np.diff(column)
         at = np.flatnonzero(changes)
-        size = np.abs(changes[at])
-        for number, (first, _) in enumerate(runs):
-            middle = int(np.searchsorted(at, first))
-            for near in (size[max(middle - NEXT, 0) : middle], size[middle : middle + NEXT]):
-                if len(near) < NEXT:
-                    continue
-                step = float(near.min())
-                whole = np.abs(near / step - np.round(near / step)) < LATTICE
-                if whole.all() and (near < MANY * step).all():
-                    found[number] = max(found[number], step)
+        if len(at) < NEXT:
+            continue
+        near = sliding_window_view(np.abs(changes[at]), NEXT)
+        middle = np.searchsorted(at, first)
+        for begin in (middle - NEXT, middle):
+            run = np.flatnonzero((begin >= 0) & (begin < len(near)))
+            size = near[begin[run]]
+            step = size.min(axis=1, keepdims=True)
+            whole = np.abs(size / step - np.round(size / step)) < LATTICE
+            counts = (whole & (size < MANY * step)).all(axis=1)
+            found[run[counts]] = np.maximum(found[run[counts]], step[counts, 0])
     return found
 
 
@@ -301,19 +304,20 @@ def jumps(
     rows = np.flatnonzero(usable)
     if len(rows) < 20:
         return []
-    at = np.arange(len(gone))
-    known = np.stack([np.interp(at, rows, column[rows]) for column in rate.T], axis=1)
-    expected = np.zeros_like(known)
-    np.cumsum(0.5 * (known[1:] + known[:-1]) * step, axis=0, out=expected[1:])
-    beyond = np.diff(gone[rows] - expected[rows], axis=0)
+    beyond, gone_by, changed_by = (np.zeros((len(rows) - 1, gone.shape[1])) for _ in range(3))
+    at, late = np.arange(len(gone)), 2 * round(LATE_S / step) + 1
+    for i, column in enumerate(rate.T):
+        known = np.interp(at, rows, column[rows])
+        expected = np.zeros_like(known)
+        np.cumsum(0.5 * (known[1:] + known[:-1]) * step, out=expected[1:])
+        beyond[:, i] = np.diff(gone[rows, i] - expected[rows])
+        gone_by[:, i] = np.diff(expected[rows])
+        changed_by[:, i] = moving.spread(known, late)[rows[1:]]
     if period is not None:
         beyond -= period * np.round(beyond / period)
-    error = np.linalg.norm(beyond, axis=1)
-    travel = np.linalg.norm(np.diff(expected[rows], axis=0), axis=1)
+    error, travel = np.linalg.norm(beyond, axis=1), np.linalg.norm(gone_by, axis=1)
     limit = max(12.0 * 1.4826 * float(np.median(error)), 8.0 * noise)
-    late = 2 * round(LATE_S / step) + 1
-    changes = maximum_filter1d(known, late, axis=0) - minimum_filter1d(known, late, axis=0)
-    lag = np.linalg.norm(changes[rows[1:]], axis=1) * np.diff(rows) * step
+    lag = np.linalg.norm(changed_by, axis=1) * np.diff(rows) * step
     usual = SAME_TRAVEL * travel + lag if lively else 0.0
     gap = np.where(np.diff(rows) > 1.5 * every_rows, 0.5 * travel, 0.0)
     found = np.flatnonzero(error > limit + np.maximum(gap, usual))

@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 
 import polars as pl
 
-from shiplog import channels
-from shiplog.logs.health_report import Instrument, VoyageReport
+from shiplog.logs.health_report import VoyageReport
 from shiplog.logs.read import Contents, Reading, read
 from shiplog.logs.senders import Senders
 from shiplog.profile import Profile
@@ -23,17 +22,13 @@ from shiplog.voyages import (
     fields_read,
     plausible_measures,
     resampling,
+    sampling,
     two_sources,
 )
 from shiplog.voyages import one_hertz as tables
 from shiplog.voyages.alignment import Aligned
 from shiplog.voyages.comparison import Comparison, compare
 from shiplog.voyages.sensor_findings import Estimate
-
-RESOLVED = {  # of a sensor: the channel whose unit its resolution has
-    "position": channels.X0, "velocity": channels.SURGE, "heading": channels.HEADING,
-    "yaw_rate": channels.YAW_RATE, "wind": channels.WIND_SPEED,
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -61,8 +56,11 @@ def build(reading: Reading, profile: Profile, sent: Mapping[str, Senders] | None
 
     sent  by topic, those who send on it, where there are several
     """
-    aligned = alignment.aligned(reading, profile, sent or {})
-    table, grid = aligned.table, aligned.grid
+    sampled = sampling.sampled(reading, profile, sent or {})
+    reading = replace(reading, frames={})  # half of a long log's memory, with the samples
+    aligned = alignment.aligned(sampled)
+    del sampled
+    table = aligned.table
     compared = _compared(aligned, profile)
     usable_s, windows = usable(table, profile)
     report = VoyageReport(
@@ -70,18 +68,16 @@ def build(reading: Reading, profile: Profile, sent: Mapping[str, Senders] | None
         messages_read=reading.health.messages_read,
         messages_lost=reading.health.messages_lost,
         rows=table.height,
-        seconds=round(grid.seconds, 3),
+        seconds=round(aligned.seconds, 3),
         findings=(
             *clock_contradictions.unreported(reading.health.findings, aligned.left_out),
             *aligned.left_out,
-            *comparison.without_consequences(grid.findings, compared.findings),
+            *comparison.without_consequences(aligned.findings, compared.findings),
             *compared.findings,
         ),
         usable_s=usable_s,
         windows=windows,
-        instruments=tuple(
-            _instrument(*one) for one in aligned.samples if len(one[1].time) > 1 and not one[1].hold
-        ),
+        instruments=aligned.instruments,
         not_compared=compared.not_compared,
     )
     return Voyage(
@@ -100,7 +96,7 @@ def usable(table: pl.DataFrame, profile: Profile) -> tuple[int, int]:
 
 def consistency_of(reading: Reading, profile: Profile, sent: Mapping[str, Senders]) -> Comparison:
     """What the sensors of a log say of themselves and of each other. Raises as `build` does."""
-    aligned = alignment.aligned(reading, profile, sent)
+    aligned = alignment.aligned(sampling.sampled(reading, profile, sent))
     compared = _compared(aligned, profile)
     own = [f for f in aligned.left_out if f.kind in ("status", "two_sources", "contradiction")]
     return replace(compared, findings=(*own, *compared.findings))
@@ -118,12 +114,3 @@ def _compared(aligned: Aligned, profile: Profile) -> Comparison:
         findings=(*compared.findings, *implausible),
         not_compared=(*compared.not_compared, *plausible_measures.not_compared(profile)),
     )
-
-
-def _instrument(name: str, samples: resampling.Samples) -> Instrument:
-    channel = RESOLVED.get(name)
-    factor = channel.to_display if channel else 0.0
-    unit = channel.display_unit if channel else ""
-    finest, sigma = (float(f"{v * factor:.3g}") for v in (samples.resolution, samples.noise))
-    rate, unsure = round(1.0 / samples.period_s, 3), round(samples.unsure_s, 3)
-    return Instrument(name, rate, finest, unit, sigma, unsure)

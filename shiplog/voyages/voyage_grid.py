@@ -123,13 +123,8 @@ def mark_jumps(grid: VoyageGrid, profile: Profile, sampled: dict[str, resampling
 
     Looked for from one measured value to the next, not between rows that were interpolated.
     """
-    columns = {name: np.nan_to_num(column) for name, column in grid.columns.items()}
-    heading, turning = columns["heading"], columns["yaw_rate"]
-    known = np.isfinite(grid.columns["heading"])
-    heading[known] = np.unwrap(heading[known])  # across a gap, not by way of its zeros
     over_ground = np.nan_to_num(_over_ground(grid))
-    position = np.stack((columns["x0"], columns["y0"]), 1)
-
+    position = np.nan_to_num(np.stack((grid.columns["x0"], grid.columns["y0"]), 1))
     found = []
     scale = held_values.METRE if profile.sensors.kind("position") == "geodetic" else 1.0
     of_position = ("position", "velocity", "heading")
@@ -142,10 +137,12 @@ def mark_jumps(grid: VoyageGrid, profile: Profile, sampled: dict[str, resampling
     if profile.sensors.yaw_rate is None:  # a derivative is not compared with what it is of
         turns, lasting = _steps(grid, sampled["heading"]), None
     else:
+        heading, lasting = (np.nan_to_num(grid.columns[c]) for c in ("heading", "yaw_rate"))
+        known = np.isfinite(grid.columns["heading"])
+        heading[known] = np.unwrap(heading[known])  # across a gap, not by way of its zeros
         of_heading = ("heading", "yaw_rate")
         full = 2.0 * math.pi
-        turns = _jumps(grid, sampled, of_heading, heading[:, None], turning[:, None], full)
-        lasting = turning
+        turns = _jumps(grid, sampled, of_heading, heading[:, None], lasting[:, None], full)
     for row, step in turns:
         if step > JUMP_RAD:
             grid.marks[row] |= int(Quality.JUMP)

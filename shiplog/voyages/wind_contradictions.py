@@ -158,7 +158,11 @@ def _contradiction(
     seconds: tuple[np.ndarray, ...], of: Slope, profile: Profile, table: pl.DataFrame
 ) -> Finding | None:
     speed, angle, heading, velocity = seconds
-    spreads = {c: _least_spread(c, speed, angle, heading, velocity) for c in CONVENTIONS}
+    as_it_is, *others = CONVENTIONS
+    spreads = {as_it_is: _least_spread(as_it_is, speed, angle, heading, velocity)}
+    before = spreads[as_it_is]
+    if before is not None and before.mean() >= RATIO * GUSTS**2:  # else none is so much better
+        spreads |= {c: _least_spread(c, speed, angle, heading, velocity) for c in others}
     air = speed * np.exp(1j * angle)
 
     def gain(beta: complex) -> float:
@@ -169,16 +173,16 @@ def _contradiction(
     beta = known or (np.exp(1j * of.turned) if of.turned else None)
     if beta is not None and gain(beta) < LEAST_GAIN:
         beta = None  # something else turns with the ship
-    as_it_is, best = spreads[CONVENTIONS[0]], _best(spreads)
+    best = _best(spreads)
     after = spreads[best] if best else None
-    turned = after is not None and as_it_is is not None and _better(as_it_is, after)
+    turned = after is not None and before is not None and _better(before, after)
     if beta is not None and turned and best:
         # the one that leaves less, in m/s, of what turns with the ship
         of_speed = _left(air - beta * velocity, heading)
         of_angle = _left(best.true_wind(speed, angle, heading, velocity))
         turned = of_angle * ALIKE < of_speed
-    if turned and best and after is not None and as_it_is is not None:
-        times = math.sqrt(as_it_is.mean() / max(float(after.mean()), 1e-12))
+    if turned and best and after is not None and before is not None:
+        times = math.sqrt(before.mean() / max(float(after.mean()), 1e-12))
         return _of_angle(best, times, profile, table)
     if beta is None:
         return None
