@@ -16,7 +16,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from pipelines.api import (
+    from shiplog.commands.api import (
         Comparison,
         Diagnosis,
         Evaluation,
@@ -48,10 +48,10 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from shiplog import disk_cache
+    from shiplog.machine import disk_cache
 
     disk_cache.keep_compiled()
-    from pipelines import api
+    from shiplog.commands import api
 
     return getattr(api, name)
 

@@ -9,15 +9,16 @@ import jax.numpy as jnp
 import numpy as np
 
 from pipelines.experiments import simulated_ship
-from shiplog import profile_file as profiles
-from shiplog.diagnosis import linearisation, residual_acceleration, segments
-from shiplog.diagnosis.likelihood import ProcessNoise
-from shiplog.diagnosis.linear_segments import Linear, Wide
+from shiplog.diagnosis.linear import linearisation, segments
+from shiplog.diagnosis.linear.linear_segments import Linear, Wide
+from shiplog.diagnosis.noise import residual_acceleration
+from shiplog.diagnosis.noise.likelihood import ProcessNoise
 from shiplog.models import mmg
 from shiplog.models.extended import Extended
 from shiplog.models.mmg import body
+from shiplog.ship_profile import file as profiles
 from shiplog.simulation.sensitivities import rate
-from shiplog.voyages.recording import Record
+from shiplog.voyages.rows.recording import Record
 
 PROFILE = profiles.load("esso-vectwin")
 SHIP, PARTICULARS, _ = mmg.geometry_of(PROFILE)

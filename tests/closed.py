@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from shiplog.profile import Profile
-from shiplog.voyages.recording import Record
+from shiplog.ship_profile.profile import Profile
+from shiplog.voyages.rows.recording import Record
 
 SECONDS, STEP = 120.0, 0.1
 TRUE_WIND = (-2.0, 1.1)  # m/s, where it comes from: north, east

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from xdist.scheduler import LoadFileScheduling
 
-from shiplog import disk_cache
+from shiplog.machine import disk_cache
 
 # Many small matrices: BLAS's threads would wait for each other. Set before numpy is loaded.
 for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
@@ -65,9 +65,9 @@ def shared_data() -> Path:
 def trained_here():
     """Networks are trained in this process, task by task: to start another one and to load torch
     there takes longer than a short training. The queue of processes has tests of its own."""
-    from pipelines import train_networks
+    from shiplog.commands import train_networks
     from shiplog.exceptions import ShiplogError
-    from shiplog.training.queue import Event
+    from shiplog.training.network.queue import Event
 
     def work(tasks, workers=None):
         for task in tasks:

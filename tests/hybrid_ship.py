@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from shiplog import profile_file as profiles
 from shiplog.models.mmg import MMG, estimated, geometry_of
-from shiplog.profile import Profile
+from shiplog.ship_profile import file as profiles
+from shiplog.ship_profile.profile import Profile
 from shiplog.simulation import sensitivities
 from shiplog.simulation.sensitivities import WindowSeries
 

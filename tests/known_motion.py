@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import polars as pl
 
-from shiplog import profile_file as profiles
-from shiplog.profile import Profile
+from shiplog.ship_profile import file as profiles
+from shiplog.ship_profile.profile import Profile
 
 FINE = 20  # steps of the motion a row of 0.1 s
 KNOT = 1852.0 / 3600.0

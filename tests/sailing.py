@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from shiplog import profile_file as profiles
-from shiplog.logs.write import Series, write_log
-from shiplog.profile import Profile
-from shiplog.voyages.ingest import ingest
-from shiplog.voyages.store import Store
+from shiplog.logs.conversion.write import Series, write_log
+from shiplog.ship_profile import file as profiles
+from shiplog.ship_profile.profile import Profile
+from shiplog.voyages.ingest.ingest import ingest
+from shiplog.voyages.store.store import Store
 
 START = 1_700_000_000_000_000_000
 RADIUS, SPEED = 20.0, 0.8  # m, m/s: a steady starboard turn

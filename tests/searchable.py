@@ -6,8 +6,8 @@ import numpy as np
 import straight
 from straight import CAUSES
 
-from shiplog.diagnosis import evidence
-from shiplog.diagnosis.search import Search
+from shiplog.diagnosis.hypotheses import evidence
+from shiplog.diagnosis.hypotheses.search import Search
 
 SENSITIVITY = 0.6
 NOMINAL_SEED, TRIAL_SEED = 1, 2

@@ -6,7 +6,7 @@ import polars as pl
 import torch
 
 from shiplog.models.feedforward import FeedForward, driven_by, scaling
-from shiplog.voyages.windows import Windows
+from shiplog.voyages.windows.windows import Windows
 
 
 def windows(count=5, size=20, actuators=3, wind=2, seed=0):

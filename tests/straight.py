@@ -11,28 +11,23 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from shiplog import profile_file as profiles
-from shiplog.diagnosis import (
-    discrepancy,
-    likelihood,
-    linear_segments,
-    nominal_reference,
-    segment_nodes,
-    segments,
-)
-from shiplog.diagnosis.discrepancy import Discrepancy
-from shiplog.diagnosis.fitted import Fit, Point
-from shiplog.diagnosis.likelihood import ProcessNoise
-from shiplog.diagnosis.linear_segments import Linear, Path
-from shiplog.diagnosis.nominal_campaign import Campaign, prior
-from shiplog.diagnosis.nominal_reference import Reference
-from shiplog.diagnosis.parameter_layout import Columns
-from shiplog.diagnosis.trial import Trial
-from shiplog.diagnosis.unrecorded_thruster import SideForce
-from shiplog.diagnosis.voyage_effects import VoyageEffects, reduced
+from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
+from shiplog.diagnosis.linear import linear_segments, segment_nodes, segments
+from shiplog.diagnosis.linear.linear_segments import Linear, Path
+from shiplog.diagnosis.linear.parameter_layout import Columns
+from shiplog.diagnosis.noise import discrepancy, likelihood
+from shiplog.diagnosis.noise.discrepancy import Discrepancy
+from shiplog.diagnosis.noise.likelihood import ProcessNoise
+from shiplog.diagnosis.nominal import nominal_reference
+from shiplog.diagnosis.nominal.nominal_campaign import Campaign, prior
+from shiplog.diagnosis.nominal.nominal_reference import Reference
+from shiplog.diagnosis.nominal.voyage_effects import VoyageEffects, reduced
+from shiplog.diagnosis.trial.fitted import Fit, Point
+from shiplog.diagnosis.trial.trial import Trial
 from shiplog.models.causes import Cause, Parameter, Setting
-from shiplog.voyages.recording import Record
-from shiplog.voyages.timescale import KNOT, SEGMENT_S
+from shiplog.ship_profile import file as profiles
+from shiplog.voyages.rows.recording import Record
+from shiplog.voyages.rows.timescale import KNOT, SEGMENT_S
 
 PROFILE = profiles.load("esso-vectwin")
 NOISE = np.array([0.02, 0.01, 0.03, 0.015, 0.004, 0.002])

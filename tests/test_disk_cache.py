@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from shiplog import disk_cache
+from shiplog.machine import disk_cache
 
 
 @pytest.fixture

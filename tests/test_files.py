@@ -13,7 +13,7 @@ import polars as pl
 import pytest
 from safetensors import SafetensorError
 
-from shiplog import files
+from shiplog.machine import files
 
 KILLED = """
 import os, signal, sys

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from shiplog import frames
+from shiplog.nomenclature import frames
 
 
 def test_a_ship_spinning_about_midship_does_not_move_there():

@@ -7,8 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from shiplog import disk_cache
-from shiplog.jit_cache import Traced
+from shiplog.machine import disk_cache
+from shiplog.machine.jit_cache import Traced
 from shiplog.models.causes import CATALOGUE
 from shiplog.models.causes.environment import Current
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from shiplog.numbers import counted, figure, percent
+from shiplog.nomenclature.numbers import counted, figure, percent
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,11 @@ import sailing
 import tomli_w
 
 from pipelines.experiments import profile_reference
-from shiplog import profile, profile_channels, profile_file, units
 from shiplog.exceptions import ProfileError
+from shiplog.nomenclature import units
+from shiplog.ship_profile import file as profile_file
+from shiplog.ship_profile import profile
+from shiplog.ship_profile import table_channels as profile_channels
 
 ARM, SIGMA = "lever_arm_m = [0.7, -0.2]", "sigma = 0.01"
 FINITE = "has to be a finite number"

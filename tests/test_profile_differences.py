@@ -3,7 +3,7 @@
 import pytest
 import sailing
 
-from shiplog.profile_differences import differences, readings
+from shiplog.ship_profile.differences import differences, readings
 
 MINE = sailing.profile()
 

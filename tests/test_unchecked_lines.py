@@ -2,9 +2,9 @@
 
 import pytest
 
-from shiplog import profile_file
 from shiplog.exceptions import ProfileError
-from shiplog.unchecked_lines import unchecked_lines
+from shiplog.ship_profile import file as profile_file
+from shiplog.ship_profile.unchecked_lines import unchecked_lines
 
 DRAFT = """# Look over every line that says CHECK.
 [ship]

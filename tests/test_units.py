@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shiplog import units
-from shiplog.profile import Source
+from shiplog.nomenclature import units
+from shiplog.ship_profile.profile import Source
 
 TURN = Fraction("6.283185307179586476925286766559")  # rad
 # NIST SP 811, Appendix B; a servo's full command is 400 us of its pulse.

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 import straight
 
-from shiplog.diagnosis.fitted import Found
-from shiplog.diagnosis.hypothesis import Hypothesis
-from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
-from shiplog.diagnosis.search import Search
-from shiplog.diagnosis.unrecorded_thruster import SideForce
+from shiplog.diagnosis.hypotheses.hypothesis import Hypothesis
+from shiplog.diagnosis.hypotheses.search import Search
+from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
+from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
+from shiplog.diagnosis.trial.fitted import Found
 
 SIZE = 0.5  # of every number, where none is given: what matters is 0.1 and, of one, 0.4
 

@@ -33,7 +33,7 @@ from shiplog.models.mmg.estimate import GRAVITY
 from shiplog.models.mmg.geometry import Geometry, geometry_of
 from shiplog.models.mmg.model import named
 from shiplog.models.physical import Beginning, PhysicalModel, Settings
-from shiplog.profile import Profile
+from shiplog.ship_profile.profile import Profile
 
 TABLE = {  # the entry of each coefficient, and where it starts: a merchant ship's
     "steering.k": (Entry("K'", "turning ability", 0.5, 0.2, 0.0, 10.0), 1.2),

@@ -20,12 +20,12 @@ from typing import Any
 
 import tomli_w
 
-from pipelines.convert import convert, draft
-from pipelines.prepare import expand
-from shiplog import profile_file as profiles
-from shiplog.profile import Profile
-from shiplog.report import tables
-from shiplog.voyages.ingest import ingest
+from shiplog.commands.convert import convert, draft
+from shiplog.commands.prepare import expand
+from shiplog.report.evaluation import tables
+from shiplog.ship_profile import file as profiles
+from shiplog.ship_profile.profile import Profile
+from shiplog.voyages.ingest.ingest import ingest
 
 ENOUGH = 0.95  # of the windows of the owner's profile
 DATA_SETS = {  # folder, what is converted or ingested, the profile of its owner

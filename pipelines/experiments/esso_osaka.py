@@ -13,15 +13,15 @@ from pathlib import Path
 
 import polars as pl
 
-from pipelines.convert import convert
-from pipelines.evaluate import evaluate_runs
-from pipelines.prepare import expand, ingest_logs
-from pipelines.train_networks import train_run
-from shiplog import profile_file as profiles
-from shiplog.report.evaluation import EvaluatedRuns
-from shiplog.training.run_config import Config
-from shiplog.voyages.split_settings import Split
-from shiplog.voyages.store import Store
+from shiplog.commands.convert import convert
+from shiplog.commands.evaluate import evaluate_runs
+from shiplog.commands.prepare import expand, ingest_logs
+from shiplog.commands.train_networks import train_run
+from shiplog.report.evaluation.evaluation import EvaluatedRuns
+from shiplog.ship_profile import file as profiles
+from shiplog.training.settings.run_config import Config
+from shiplog.voyages.store.store import Store
+from shiplog.voyages.windows.split_settings import Split
 
 TRAINING, TEST = "wakita2022_trainTZRBplus", "wakita2022_test"  # columns of runs.csv
 VALIDATION = "random_06-Aug-2020_16_24_25_1"

@@ -21,17 +21,18 @@ from pathlib import Path
 
 import polars as pl
 
-from pipelines.demo import sample_logs
-from pipelines.evaluate import comparison, evaluate_runs
 from pipelines.experiments.esso_osaka import TWIN, published_split, trials_store
-from pipelines.identify import identify_run
-from pipelines.prepare import ingest_logs
-from pipelines.train_networks import train_run
-from shiplog.report import tables, viewer
-from shiplog.training.run_config import Config
-from shiplog.voyages.split import choose_split
-from shiplog.voyages.split_settings import Split
-from shiplog.voyages.store import Store
+from shiplog.commands.demo import sample_logs
+from shiplog.commands.evaluate import comparison, evaluate_runs
+from shiplog.commands.identify import identify_run
+from shiplog.commands.prepare import ingest_logs
+from shiplog.commands.train_networks import train_run
+from shiplog.report import viewer
+from shiplog.report.evaluation import tables
+from shiplog.training.settings.run_config import Config
+from shiplog.voyages.store.store import Store
+from shiplog.voyages.windows.split import choose_split
+from shiplog.voyages.windows.split_settings import Split
 
 EQUAL = Split(  # both sides learn from the same two voyages and look at the same third
     training=("random_31-Jul-2020_12_48_39", "random_06-Aug-2020_16_24_25_4"),

@@ -20,7 +20,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from shiplog.report import tables
+from shiplog.report.evaluation import tables
 
 ROOT = Path(__file__).parents[2]
 EQUAL = 1e-9  # relative, of numbers above one; else absolute

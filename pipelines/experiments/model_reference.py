@@ -16,7 +16,7 @@ from shiplog.models.causes.environment import ShallowWater
 from shiplog.models.causes.ship import RudderOffset
 from shiplog.models.coefficients import ParameterEntry
 from shiplog.models.mmg.parameters import TABLE
-from shiplog.report import tables
+from shiplog.report.evaluation import tables
 
 CATALOGUE_HEAD = """# The catalogue of causes
 

@@ -13,11 +13,13 @@ from pathlib import Path
 
 from pydantic.fields import FieldInfo
 
-from shiplog import profile, profile_file, units
-from shiplog.profile import Section
-from shiplog.profile_channels import LEVEL, SENSOR_KINDS, TABLE_CHANNELS, TABLE_LABELS
-from shiplog.profile_units import DRIVEN
-from shiplog.report import tables
+from shiplog.nomenclature import units
+from shiplog.report.evaluation import tables
+from shiplog.ship_profile import file as profile_file
+from shiplog.ship_profile import profile
+from shiplog.ship_profile.profile import Section
+from shiplog.ship_profile.table_channels import LEVEL, SENSOR_KINDS, TABLE_CHANNELS, TABLE_LABELS
+from shiplog.ship_profile.units_of_channels import DRIVEN
 
 HEAD = """# The ship profile
 

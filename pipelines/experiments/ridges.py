@@ -17,14 +17,14 @@ import numpy as np
 
 from pipelines.experiments.esso_osaka import trials_store
 from pipelines.experiments.extrapolation import EQUAL
-from shiplog.report import tables
+from shiplog.report.evaluation import tables
 from shiplog.simulation.sensitivities import losses
-from shiplog.training import regularisation
-from shiplog.training.model_selection import physics
-from shiplog.training.run_config import Config
-from shiplog.training.setup import prepare
-from shiplog.voyages.split import plan
-from shiplog.voyages.split_settings import Split
+from shiplog.training.physics import regularisation
+from shiplog.training.physics.model_selection import physics
+from shiplog.training.physics.setup import prepare
+from shiplog.training.settings.run_config import Config
+from shiplog.voyages.windows.split import plan
+from shiplog.voyages.windows.split_settings import Split
 
 
 def least(judged: dict[float, np.ndarray]) -> float:

@@ -54,7 +54,7 @@ def _version(asked: bool) -> None:
         return
     from importlib.metadata import version
 
-    from shiplog.training import kernel
+    from shiplog.training.network import kernel
 
     level = kernel.level()
     engine = f"compiled kernel, {level}" if level else "torch (no compiled kernel)"

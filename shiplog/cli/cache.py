@@ -6,9 +6,9 @@ from typing import Annotated
 
 import typer
 
-from shiplog import disk_cache
 from shiplog.cli.options import JsonOption
 from shiplog.cli.output import answer
+from shiplog.machine import disk_cache
 
 
 def cache(
@@ -21,7 +21,7 @@ def cache(
 
     Example: shiplog cache --clear
     """
-    from shiplog.report.text_table import table
+    from shiplog.report.evaluation.text_table import table
 
     removed = disk_cache.trim(0 if clear else disk_cache.LIMIT)
     sizes = disk_cache.sizes()

@@ -15,9 +15,9 @@ def check(logs: Logs, profile: ProfileOption = None, json_to: JsonOption = None)
     Example: shiplog check sample_logs/voyage_1.mcap
     """
     check_paths(logs, profile)
-    from pipelines.bars import loading
+    from shiplog.commands.bars import loading
 
     with loading():
-        from pipelines.prepare import check_logs
+        from shiplog.commands.prepare import check_logs
 
     leave(check_logs(logs, profile), json_to)

@@ -33,7 +33,7 @@ def compare(
 
     Example: shiplog compare runs/ref runs/d-ref --save compare.rrd
     """
-    from shiplog.paths import check_file
+    from shiplog.machine.paths import check_file
 
     if web and save is not None:
         raise UsageError(
@@ -42,11 +42,11 @@ def compare(
         )
     check_runs(runs, store, voyages, cause)
     to = check_file(save or runs[0] / "compare.rrd", "--save")
-    from pipelines.bars import loading
+    from shiplog.commands.bars import loading
 
     with loading():
-        from pipelines.evaluate import compare_runs
-    from shiplog.voyages.store import Store
+        from shiplog.commands.evaluate import compare_runs
+    from shiplog.voyages.store.store import Store
 
     result = compare_runs(runs, Store(store), voyages or [], to, cause or [])
     answer(result.text, result.content, json_to)

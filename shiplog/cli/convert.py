@@ -33,14 +33,14 @@ def convert(
 
     Example: shiplog convert tables/*.parquet --profile esso-osaka --out logs
     """
-    from shiplog.paths import check_writable
+    from shiplog.machine.paths import check_writable
 
     check_writable(out, "--out")
-    from shiplog import profile_file as profiles
+    from shiplog.ship_profile import file as profiles
 
     ship = profiles.load(profile) if profile else None
-    from pipelines.convert import convert as convert_tables
-    from shiplog.numbers import counted
+    from shiplog.commands.convert import convert as convert_tables
+    from shiplog.nomenclature.numbers import counted
 
     done = convert_tables(tables, ship, out)
     content = {"contract": 1, "logs": [str(path) for path in done.logs], "refused": done.refused}

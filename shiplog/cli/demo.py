@@ -28,14 +28,14 @@ def demo(
 
     Example: shiplog demo --out demo --no-view
     """
-    from shiplog.paths import check_writable, sample_logs
+    from shiplog.machine.paths import check_writable, sample_logs
 
     check_writable(out, "--out")
     folder = sample_logs(logs)
-    from pipelines.bars import loading
+    from shiplog.commands.bars import loading
 
     with loading():
-        from pipelines.demo import run_demo
+        from shiplog.commands.demo import run_demo
 
     result = run_demo(out, folder)
     answer(result.text, result.content, json_to)

@@ -35,14 +35,14 @@ def diagnose(
 
     Example: shiplog diagnose runs/mmg --voyages 'season2_*' --extend runs/mmg2
     """
-    from shiplog.paths import check_diagnosis
+    from shiplog.machine.paths import check_diagnosis
 
     check_diagnosis(out, extend)
     check_runs([run], store, voyages, cause)
-    from pipelines.bars import loading
+    from shiplog.commands.bars import loading
 
     with loading():
-        from pipelines.diagnose import diagnose_command
+        from shiplog.commands.diagnose import diagnose_command
 
     found = diagnose_command(
         store, run, voyages=voyages or [], out=out, extend=extend, cause_files=cause or []

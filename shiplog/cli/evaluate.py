@@ -26,11 +26,11 @@ def evaluate(
     Example: shiplog evaluate runs/ref --voyages voyage_6
     """
     check_runs([run], store, voyages, cause)
-    from pipelines.bars import loading
+    from shiplog.commands.bars import loading
 
     with loading():
-        from pipelines.evaluate import evaluate_runs, save
-    from shiplog.voyages.store import Store
+        from shiplog.commands.evaluate import evaluate_runs, save
+    from shiplog.voyages.store.store import Store
 
     found = evaluate_runs([run], Store(store), voyages or [], cause or [])
     answer(found.text(), found.answer(found.runs[0]), json_to)

@@ -19,8 +19,8 @@ from collections.abc import Sequence
 
 import typer
 
-from shiplog.logs import reading_limits
-from shiplog.logs.reading_limits import Watch
+from shiplog.machine import reading_limits
+from shiplog.machine.reading_limits import Watch
 
 # Commands that read logs and tables, and whether one begins anew where it was: `convert` does not
 # write a log that is there already.

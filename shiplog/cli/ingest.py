@@ -30,11 +30,11 @@ def ingest(
 
     Example: shiplog ingest sample_logs --store store
     """
-    from shiplog.paths import check_writable
+    from shiplog.machine.paths import check_writable
 
     check_writable(store, "--store")
     check_paths(logs, profile)
-    from pipelines.prepare import expand, ingest_logs
-    from shiplog.voyages.store import Store
+    from shiplog.commands.prepare import expand, ingest_logs
+    from shiplog.voyages.store.store import Store
 
     leave(ingest_logs(expand(logs), profile, Store(store), correct), json_to)

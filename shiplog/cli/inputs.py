@@ -9,8 +9,8 @@ from pathlib import Path
 def check_paths(logs: Sequence[Path], profile: str | None) -> None:
     """Raises ShiplogError where there is no such profile, or none of the logs is there; one of
     several that is not there does not stop the others."""
-    from shiplog import profile_file as profiles
     from shiplog.exceptions import LogUnreadable
+    from shiplog.ship_profile import file as profiles
 
     if profile is not None:
         profiles.load(profile)
@@ -22,7 +22,7 @@ def check_paths(logs: Sequence[Path], profile: str | None) -> None:
 
 def check_voyages(store: Path, *patterns: Sequence[str] | None) -> None:
     """Raises StoreError for a store or voyage that is not there."""
-    from shiplog.voyages.store import Store
+    from shiplog.voyages.store.store import Store
 
     for chosen in patterns:
         Store(store).select(list(chosen or ()))
@@ -35,7 +35,7 @@ def check_runs(
     causes: Sequence[Path] | None,
 ) -> None:
     """Raises ShiplogError for a run, voyage or file that is not there."""
-    from shiplog.paths import check_causes, check_run, refuse_same_names
+    from shiplog.machine.paths import check_causes, check_run, refuse_same_names
 
     for run in runs:
         check_run(run)

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from shiplog.channels import LEAST_WINDOW
 from shiplog.exceptions import UsageError
+from shiplog.nomenclature.channels import LEAST_WINDOW
 
 
 def _ask_json(json_to: str | None) -> str | None:
@@ -17,7 +17,7 @@ def _ask_json(json_to: str | None) -> str | None:
         return json_to
     if not json_to:
         raise UsageError("--json is given no path.", hint="give --json a file's path, or -.")
-    from shiplog.paths import check_file
+    from shiplog.machine.paths import check_file
 
     return str(check_file(Path(json_to), "--json", streams=True))
 

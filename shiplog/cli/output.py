@@ -23,7 +23,7 @@ def answer(text: str, content: dict, json_to: str | None) -> None:
 
     Raises ShiplogError where the JSON cannot be written.
     """
-    from shiplog import files
+    from shiplog.machine import files
 
     if json_to == "-":
         if text:
@@ -85,7 +85,7 @@ def _cells(line: str) -> list[str]:
 
 def leave(done, json_to: str | None) -> None:
     """Answer; exit 1 where nothing could be taken, 3 where something was lost or refused."""
-    from shiplog.report import tables
+    from shiplog.report.evaluation import tables
 
     text = "\n".join(line for one in done.reports for line in tables.voyage_lines(one))
     answer(text, tables.voyages_json(done.reports, done.refused), json_to)

@@ -56,9 +56,9 @@ def paper(
 
     Example: shiplog paper --seeds 10 --out paper
     """
-    from shiplog.paths import check_writable
-    from shiplog.training.options import TrainOptions
-    from shiplog.voyages.augmentation import AUGMENTATIONS
+    from shiplog.machine.paths import check_writable
+    from shiplog.training.settings.options import TrainOptions
+    from shiplog.voyages.windows.augmentation import AUGMENTATIONS
 
     chosen = list(dict.fromkeys(data or AUGMENTATIONS))
     for name in chosen:
@@ -66,10 +66,10 @@ def paper(
     _refuse_together(device, jobs, ray)
     check_writable(out, "--out")
     check_voyages(store, voyages, validation)
-    from pipelines.bars import loading
+    from shiplog.commands.bars import loading
 
     with loading():
-        from pipelines.paper import paper_command
+        from shiplog.commands.paper import paper_command
 
     found = paper_command(
         store,

@@ -16,10 +16,10 @@ from typing import NoReturn
 
 import typer
 
-from shiplog import disk_cache
 from shiplog.cli import guard
 from shiplog.cli.app import app
 from shiplog.exceptions import ShiplogError
+from shiplog.machine import disk_cache
 
 STOPPED = 130  # by Ctrl-C, as shells have it
 STOPPED_SENTENCE = "stopped; what was finished is kept"
@@ -38,7 +38,6 @@ def main() -> None:
     disk_cache.keep_compiled()
     logging.basicConfig(format="%(message)s", handlers=[_Lines()], level=logging.WARNING)
     logging.getLogger("shiplog").setLevel(logging.INFO)
-    logging.getLogger("pipelines").setLevel(logging.INFO)
     for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
         if signal.getsignal(number) is signal.SIG_DFL:  # not under nohup
             signal.signal(number, _stopped)
@@ -83,7 +82,7 @@ def _fault(error: BaseException) -> ShiplogError:
     """The message for a user."""
     if isinstance(error, ShiplogError):
         return error
-    from shiplog.unexpected import unexpected
+    from shiplog.machine.unexpected import unexpected
 
     return unexpected(error)
 

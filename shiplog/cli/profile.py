@@ -27,13 +27,13 @@ def profile(
 
     Example: shiplog profile unknown.mcap --out my-ship.toml
     """
-    from shiplog import files
-    from shiplog.paths import check_file, refuse_taken
+    from shiplog.machine import files
+    from shiplog.machine.paths import check_file, refuse_taken
 
     if out is not None:
         refuse_taken(out)
         out = check_file(out, "--out")
-    from pipelines.convert import draft
+    from shiplog.commands.convert import draft
 
     text = draft(log, vessel)
     content = {"contract": 1, "profile": text, "written": None if out is None else str(out)}

@@ -23,7 +23,7 @@ from shiplog.cli.options import (
 from shiplog.cli.output import answer
 from shiplog.exceptions import UsageError, listed
 from shiplog.models import FORCES, MODELS
-from shiplog.voyages.augmentation import AUGMENTATIONS
+from shiplog.voyages.windows.augmentation import AUGMENTATIONS
 
 Out = Annotated[Path, typer.Option(help="The run folder to make.")]
 Model = Annotated[str, typer.Option(help=f"Which dynamic model: {', '.join(MODELS)}.")]
@@ -115,8 +115,8 @@ def train(
 
     Example: shiplog train --again runs/mmg --out runs/mmg-2
     """
-    from shiplog.paths import check_run, check_writable, refuse_run
-    from shiplog.training.options import TrainOptions
+    from shiplog.machine.paths import check_run, check_writable, refuse_run
+    from shiplog.training.settings.options import TrainOptions
 
     options = TrainOptions(
         model=model, data=data, voyages=tuple(voyages or ()), validation=tuple(validation or ()),
@@ -130,13 +130,13 @@ def train(
     if again is not None:
         _refuse_others(context)
         check_run(again)
-        from pipelines.train_again import again_command
+        from shiplog.commands.train_again import again_command
 
         found = again_command(store, out, again)
         answer(found.text, found.content, json_to)
         return
     check_voyages(store, voyages, validation)
-    from pipelines.train import train_command
+    from shiplog.commands.train import train_command
 
     found = train_command(store, out, options)
     answer(found.text, found.content, json_to)

@@ -34,14 +34,14 @@ def voyages(
     from dataclasses import asdict
 
     if sensors:
-        from pipelines.sensors import sensors_command
+        from shiplog.commands.sensors import sensors_command
 
         found = sensors_command(store, voyages or [])
         answer(found.text, found.content, json_to)
         return
 
-    from shiplog.report import text_table
-    from shiplog.voyages import catalogue
+    from shiplog.report.evaluation import text_table
+    from shiplog.voyages.store import catalogue
 
     if not store.exists():
         missing = ShiplogError(
@@ -54,14 +54,14 @@ def voyages(
         answer("", {"contract": 1, "voyages": []}, json_to)
         raise typer.Exit(1)
     if catalogue.unfinished(store):
-        from shiplog.voyages.store import Store  # it loads polars, which takes 0.3 s
+        from shiplog.voyages.store.store import Store  # it loads polars, which takes 0.3 s
 
         Store(store).mend(wait=False)
     entries = catalogue.entries(store)
     left_out = _left_out(store, {entry.name for entry in entries})
     if voyages:
-        from shiplog.voyages import parts
-        from shiplog.voyages.store import Store
+        from shiplog.voyages.store import parts
+        from shiplog.voyages.store.store import Store
 
         chosen = parts.overlapping([e.name for e in entries], Store(store).select(voyages))
         entries = [entry for entry in entries if entry.name in chosen]
@@ -73,7 +73,7 @@ def voyages(
 
 def _left_out(store: Path, names: set[str]) -> bool:
     """Whether a voyage of the store is not among these: one that cannot be read."""
-    from shiplog.voyages import catalogue
+    from shiplog.voyages.store import catalogue
 
     there = (path for path in store.glob("voyage=*") if (path / "voyage.json").is_file())
     return any(catalogue.name_of(path) not in names for path in there)

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from shiplog.frames import wrap
+from shiplog.nomenclature.frames import wrap
 
 
 def within_a_turn(actuator: Array, turning: Sequence[int]) -> Array:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from shiplog.frames import in_earth_axes
+from shiplog.nomenclature.frames import in_earth_axes
 
 # A model, called: (state [N, 6], actuator [N, A], wind [N, 0|2]) -> ẋ = f(x, u, ω) of Eq. 2 [N, 6]
 Dynamics = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]

@@ -16,10 +16,10 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from shiplog.frames import in_body_axes
 from shiplog.models.causes.base import Cause
 from shiplog.models.mmg import body
 from shiplog.models.mmg.model import MMG, named, total
+from shiplog.nomenclature.frames import in_body_axes
 
 
 @partial(

@@ -10,10 +10,10 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from shiplog.channels import VELOCITY_IN_STATE
 from shiplog.models.base import kinematics
 from shiplog.models.network_shape import Shape
-from shiplog.voyages.windows import Windows
+from shiplog.nomenclature.channels import VELOCITY_IN_STATE
+from shiplog.voyages.windows.windows import Windows
 
 
 @dataclass(frozen=True, slots=True)

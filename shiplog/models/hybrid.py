@@ -20,7 +20,7 @@ from shiplog.models.mmg import body
 from shiplog.models.mmg.model import MMG
 from shiplog.models.mmg.wind import apparent
 from shiplog.models.physical import PhysicalModel, Settings
-from shiplog.profile import Profile
+from shiplog.ship_profile.profile import Profile
 
 ANCHORS = 200  # training samples that stand for all of them in the distance
 FADE_LIMITS = 2.0  # limits of the coverage figure beyond the training data, where nothing is left

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from shiplog.models.coefficients import Parameters
-from shiplog.profile import Profile
+from shiplog.ship_profile.profile import Profile
 
 
 class Settings(Protocol):

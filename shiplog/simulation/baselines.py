@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shiplog.channels import VELOCITY_IN_STATE
 from shiplog.models.base import kinematics
-from shiplog.voyages.windows import Windows
+from shiplog.nomenclature.channels import VELOCITY_IN_STATE
+from shiplog.voyages.windows.windows import Windows
 
 
 def hold(state: np.ndarray, actuator: np.ndarray, wind: np.ndarray) -> np.ndarray:

@@ -15,8 +15,8 @@ import numpy as np
 import polars as pl
 from scipy.spatial import KDTree
 
-from shiplog.channels import VELOCITY
-from shiplog.voyages.wind_histogram import ANGLE_BIN, SPEED_BIN
+from shiplog.nomenclature.channels import VELOCITY
+from shiplog.voyages.windows.wind_histogram import ANGLE_BIN, SPEED_BIN
 
 QUANTILE = 0.95  # of the distances that training seconds have from other voyages' or blocks'
 BLOCK_ROWS = 100  # rows; neighbours within one block are one manoeuvre, not independent data

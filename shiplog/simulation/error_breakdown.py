@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 import polars as pl
 
-from shiplog import channels
-from shiplog.frames import wrap
-from shiplog.profile import Profile
+from shiplog.nomenclature import channels
+from shiplog.nomenclature.frames import wrap
+from shiplog.ship_profile.profile import Profile
 from shiplog.simulation.scoring import loss_shares
 from shiplog.simulation.sensitivities import VELOCITY_COLUMNS, WindowSeries, apparent_wind
-from shiplog.voyages.windows import seconds_since
+from shiplog.voyages.windows.windows import seconds_since
 
 CHANNELS = tuple(c.name for c in channels.VELOCITY)
 MINUTE = 60.0  # s

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtri, stdtrit
 
-from shiplog.channels import VELOCITY
+from shiplog.nomenclature.channels import VELOCITY
 from shiplog.simulation.scoring import loss_shares
 
 BLOCK_WINDOWS = 2  # windows in a row that are drawn together: 200 s

@@ -13,14 +13,14 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from shiplog.exceptions import RunError
-from shiplog.frames import wrap
 from shiplog.models.causes import CATALOGUE, Cause
 from shiplog.models.extended import Extended
-from shiplog.profile import Profile
+from shiplog.nomenclature.frames import wrap
+from shiplog.ship_profile.profile import Profile
 from shiplog.simulation.scoring import window_loss
 from shiplog.simulation.sensitivities import WindowSeries, rollout
-from shiplog.voyages.recording import Record
-from shiplog.voyages.windows import Windows
+from shiplog.voyages.rows.recording import Record
+from shiplog.voyages.windows.windows import Windows
 
 NUMBER_DRAWS = 12  # of the causes' numbers, for the spread of the states
 SEED = 0

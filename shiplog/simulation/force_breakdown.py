@@ -7,8 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 import polars as pl
 
-from shiplog.channels import STATE
-from shiplog.profile import Profile
+from shiplog.nomenclature.channels import STATE
+from shiplog.ship_profile.profile import Profile
 from shiplog.simulation.sensitivities import Simulator, true_wind
 
 

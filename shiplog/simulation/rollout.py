@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from shiplog.models.base import Dynamics
-from shiplog.voyages.windows import Windows
+from shiplog.voyages.windows.windows import Windows
 
 
 def rollout(

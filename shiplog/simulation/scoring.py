@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 import polars as pl
 
-from shiplog import channels
 from shiplog.models.base import Dynamics
+from shiplog.nomenclature import channels
 from shiplog.simulation.rollout import Simulates, simulate
-from shiplog.voyages.windows import Windows
+from shiplog.voyages.windows.windows import Windows
 
 ERRORS = ("loss", "rmse_surge", "rmse_sway", "rmse_yaw_rate", "end_position_m", "end_heading_deg")
 

@@ -16,11 +16,11 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from shiplog.channels import VELOCITY_IN_STATE, VELOCITY_WEIGHTS
-from shiplog.frames import in_body_axes, in_earth_axes
-from shiplog.jit_cache import traced
+from shiplog.machine.jit_cache import traced
+from shiplog.nomenclature.channels import VELOCITY_IN_STATE, VELOCITY_WEIGHTS
+from shiplog.nomenclature.frames import in_body_axes, in_earth_axes
 from shiplog.simulation.scoring import trapezoid, window_loss
-from shiplog.voyages.windows import Windows
+from shiplog.voyages.windows.windows import Windows
 
 VELOCITY_COLUMNS = np.array(VELOCITY_IN_STATE)
 WINDOWS_AT_A_TIME = 128  # their sensitivities to 60 parameters are 45 MB

@@ -8,7 +8,8 @@ from pathlib import Path
 import polars as pl
 import sailing
 
-from shiplog import cli, disk_cache
+from shiplog import cli
+from shiplog.machine import disk_cache
 
 PROFILE = sailing.PROFILE
 TABLE = {  # what kvlcc2's [table] section reads

@@ -13,11 +13,11 @@ from pathlib import Path
 import pytest
 from command_desk import judge
 
-from shiplog import files
 from shiplog.cli import output
 from shiplog.exceptions import ShiplogError
-from shiplog.paths import check_file
-from shiplog.report.text_table import table
+from shiplog.machine import files
+from shiplog.machine.paths import check_file
+from shiplog.report.evaluation.text_table import table
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="pipes and links of POSIX")
 

@@ -17,7 +17,8 @@ from own_causes import GOOD
 from safetensors.numpy import load_file, save_file
 
 from pipelines.experiments import simulated_ship
-from shiplog import cli, files
+from shiplog import cli
+from shiplog.machine import files
 
 pytestmark = pytest.mark.usefixtures("trained_here")
 HULL = ("--model", "mmg", "--no-fit", "--without", "propeller", "--without", "rudder")

@@ -107,7 +107,7 @@ def test_evaluate_answers_as_the_contract_says(run, store, tmp_path):
 
 def test_evaluate_agrees_with_a_rollout_done_by_hand(run, store):
     """L of one window from errors.parquet, integrated again from rollouts and the 1 Hz rows."""
-    from shiplog.voyages.store import Store
+    from shiplog.voyages.store.store import Store
 
     call("evaluate", run, "--store", store)
     errors = pl.read_parquet(run / "errors.parquet").filter(
@@ -212,7 +212,7 @@ def test_no_store_is_an_empty_list_to_a_machine_and_a_message_to_a_reader(tmp_pa
 
 def test_an_unforeseen_fault_in_one_log_does_not_stop_the_others(logs, tmp_path, monkeypatch):
     """Its trace is kept, and its sentence says where."""
-    from pipelines import prepare
+    from shiplog.commands import prepare
 
     def broken(path, profile):
         if path.stem == "trip_1":

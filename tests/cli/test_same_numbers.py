@@ -14,7 +14,7 @@ from commands import call
 
 from pipelines.experiments import simulated_ship
 from pipelines.experiments.same_numbers import content, differing, run_on
-from shiplog.training import run_folder
+from shiplog.training.runs import run_folder
 
 pytestmark = pytest.mark.usefixtures("trained_here")
 SMALL = ("--window", "20", "--store", "store")

@@ -13,7 +13,7 @@ from shiplog import cli
 
 
 def test_any_other_exception_is_one_sentence_and_its_trace_is_kept(desk, capsys, monkeypatch):
-    from shiplog.voyages import catalogue
+    from shiplog.voyages.store import catalogue
 
     def broken(_store):
         raise ZeroDivisionError("division\nby zero")
@@ -33,7 +33,7 @@ def test_a_trace_is_kept_where_there_is_no_cache(desk, capsys, monkeypatch):
     """In the temporary folder."""
     import tempfile
 
-    from shiplog.voyages import catalogue
+    from shiplog.voyages.store import catalogue
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(desk.file("no-folder") / "cache"))
     monkeypatch.setattr(tempfile, "tempdir", str(desk.dir("tmp")))
@@ -47,7 +47,7 @@ def test_a_trace_is_kept_where_there_is_no_cache(desk, capsys, monkeypatch):
 def test_what_the_system_says_of_a_path_is_the_users_to_mend(desk, capsys, monkeypatch, kind):
     import errno
 
-    from shiplog.voyages import catalogue
+    from shiplog.voyages.store import catalogue
 
     code = {PermissionError: errno.EACCES, FileNotFoundError: errno.ENOENT}[kind]
 
@@ -59,7 +59,7 @@ def test_what_the_system_says_of_a_path_is_the_users_to_mend(desk, capsys, monke
 
 
 def test_ctrl_c_is_reported_and_has_its_code(desk, capsys, monkeypatch):
-    from shiplog.voyages import catalogue
+    from shiplog.voyages.store import catalogue
 
     def interrupted(_store):
         raise KeyboardInterrupt

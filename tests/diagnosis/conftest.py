@@ -10,14 +10,14 @@ from dense_trial import DRAG, SHARE
 from straight import CAUSES
 from whole_way import NOMINAL, PROFILE, TIDE, hidden, judged, log
 
-from pipelines import diagnose as pipeline
-from pipelines.identify import identify_run
-from pipelines.prepare import ingest_logs
-from shiplog.training.run_config import Config, Physics
-from shiplog.voyages import recording  # fmt: skip
-from shiplog.voyages.ingest import ingest
-from shiplog.voyages.split import choose_physical_split
-from shiplog.voyages.store import Store
+from shiplog.commands import diagnose as pipeline
+from shiplog.commands.identify import identify_run
+from shiplog.commands.prepare import ingest_logs
+from shiplog.training.settings.run_config import Config, Physics
+from shiplog.voyages.ingest.ingest import ingest
+from shiplog.voyages.rows import recording  # fmt: skip
+from shiplog.voyages.store.store import Store
+from shiplog.voyages.windows.split import choose_physical_split
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,9 @@ import straight
 from scipy.stats import multivariate_normal
 from straight import PROCESS_NOISE
 
-from shiplog.diagnosis import evidence, remainder
-from shiplog.diagnosis.remainder import NOMINAL, Remainder
+from shiplog.diagnosis.hypotheses import evidence
+from shiplog.diagnosis.noise import remainder
+from shiplog.diagnosis.noise.remainder import NOMINAL, Remainder
 
 SHARE = 0.5  # of itself that the trial counts
 DRAG = 1.5  # three realistic sizes, in the trial

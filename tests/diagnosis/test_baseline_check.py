@@ -6,8 +6,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from shiplog.diagnosis import baseline_check
-from shiplog.voyages.windows import Windows
+from shiplog.diagnosis.verdict import baseline_check
+from shiplog.voyages.windows.windows import Windows
 
 VOYAGES = ("one", "two", "three")
 DRIFT = 0.05  # m/s² of sway at full rudder

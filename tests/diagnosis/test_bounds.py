@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from shiplog.diagnosis.bounds import log_on_board, log_share, on_board, within
+from shiplog.diagnosis.noise.bounds import log_on_board, log_share, on_board, within
 
 
 def test_a_number_held_at_a_bound_moves_the_others():

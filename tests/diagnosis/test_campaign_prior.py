@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from shiplog.diagnosis.campaign_prior import INFORMATION_SHARES, learn, of_voyages, prior
-from shiplog.diagnosis.voyage_effects import VoyageEffects, reduced
+from shiplog.diagnosis.nominal.campaign_prior import INFORMATION_SHARES, learn, of_voyages, prior
+from shiplog.diagnosis.nominal.voyage_effects import VoyageEffects, reduced
 
 EACH = np.arange(12)  # parts that are voyages of their own
 

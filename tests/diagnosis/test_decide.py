@@ -7,12 +7,13 @@ import pytest
 import straight
 import weighed
 
-from shiplog.diagnosis import fits, thresholds
-from shiplog.diagnosis.decide import decide
-from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED
-from shiplog.diagnosis.result import PATTERN, REFUTED
-from shiplog.diagnosis.unrecorded_thruster import SideForce
-from shiplog.report.verdict import cause_json, side_force_json
+from shiplog.diagnosis import thresholds
+from shiplog.diagnosis.hypotheses import fits
+from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
+from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED
+from shiplog.diagnosis.verdict.decide import decide
+from shiplog.diagnosis.verdict.result import PATTERN, REFUTED
+from shiplog.report.diagnosis.verdict import cause_json, side_force_json
 
 DRAG, LOAD, TWO = ("drag",), ("load",), ("two",)
 WIND, GNSS = ("clock:wind",), ("clock:gnss",)

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import straight
 
-from shiplog import profile_file as profiles
-from shiplog.diagnosis import discrepancy
-from shiplog.diagnosis.discrepancy import SEEN, UNSEEN, WAVES
-from shiplog.diagnosis.segment_nodes import Knots
-from shiplog.profile import Profile
+from shiplog.diagnosis.linear.segment_nodes import Knots
+from shiplog.diagnosis.noise import discrepancy
+from shiplog.diagnosis.noise.discrepancy import SEEN, UNSEEN, WAVES
+from shiplog.ship_profile import file as profiles
+from shiplog.ship_profile.profile import Profile
 
 ACCELERATION = np.array([0.08, 0.05, 0.03])
 NO_GRID: Any = None  # the knots are given: nobody asks where they stand

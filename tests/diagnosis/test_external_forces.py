@@ -6,8 +6,8 @@ import afloat
 import numpy as np
 import pytest
 
-from shiplog.diagnosis import external_forces
-from shiplog.diagnosis.external_forces import Stretch
+from shiplog.diagnosis.residual import external_forces
+from shiplog.diagnosis.residual.external_forces import Stretch
 
 START, END = 70.0, 85.0
 NONE = np.zeros(0)

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from toy_ship import GRID, RECORD, ROWS, THETA, WIDE, Toy, nothing, path
 
-from shiplog import profile_file as profiles
-from shiplog.diagnosis import likelihood, linearisation, segments
-from shiplog.diagnosis.linear_segments import Path
-from shiplog.diagnosis.segments import Cut
+from shiplog.diagnosis.linear import linearisation, segments
+from shiplog.diagnosis.linear.linear_segments import Path
+from shiplog.diagnosis.linear.segments import Cut
+from shiplog.diagnosis.noise import likelihood
 from shiplog.models import mmg
+from shiplog.ship_profile import file as profiles
 
 
 @jax.tree_util.register_static

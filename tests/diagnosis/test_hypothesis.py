@@ -9,9 +9,9 @@ import pytest
 from straight import CAUSES, One
 
 from shiplog.diagnosis import thresholds
-from shiplog.diagnosis.hypotheses import Hypotheses
-from shiplog.diagnosis.hypothesis import Priors, form_error, name_of
-from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED
+from shiplog.diagnosis.hypotheses.hypothesis import Priors, form_error, name_of
+from shiplog.diagnosis.hypotheses.table import Hypotheses
+from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED
 from shiplog.models import causes
 
 FAMILIES = ("motion", "wind", "position")

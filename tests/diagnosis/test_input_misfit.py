@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shiplog.diagnosis import input_misfit, likelihood
-from shiplog.diagnosis.campaign_parts import marginal
-from shiplog.diagnosis.likelihood import ProcessNoise
-from shiplog.diagnosis.linear_segments import Linear, Path
-from shiplog.diagnosis.segment_nodes import at_knots
-from shiplog.diagnosis.segments import Cut, SegmentGrid
+from shiplog.diagnosis.linear.linear_segments import Linear, Path
+from shiplog.diagnosis.linear.segment_nodes import at_knots
+from shiplog.diagnosis.linear.segments import Cut, SegmentGrid
+from shiplog.diagnosis.noise import input_misfit, likelihood
+from shiplog.diagnosis.noise.campaign_parts import marginal
+from shiplog.diagnosis.noise.likelihood import ProcessNoise
 from shiplog.models.compiled_network import Network
-from shiplog.voyages.timescale import KNOT, NODE_ROWS
+from shiplog.voyages.rows.timescale import KNOT, NODE_ROWS
 
 KNOTS, BINS, STEP = 6, 5, 0.2
 ROWS = round((KNOTS - 1) * KNOT / STEP)

@@ -8,21 +8,14 @@ import pytest
 import straight
 from straight import CAUSES, PROCESS_NOISE, SETTING
 
-from shiplog.diagnosis import (
-    evidence,
-    intermittent,
-    likelihood,
-    on_off,
-    raised_noise,
-    segment_nodes,
-    segments,
-    unrecorded_thruster,
-)
-from shiplog.diagnosis.fitted import Fit
-from shiplog.diagnosis.intermittent import of_one_device
-from shiplog.diagnosis.nominal_reference import Reference
-from shiplog.diagnosis.remainder import INTERMITTENT, RAISED, Remainder, noise_prior
-from shiplog.diagnosis.unrecorded_thruster import SideForce
+from shiplog.diagnosis.hypotheses import evidence, intermittent, unrecorded_thruster
+from shiplog.diagnosis.hypotheses.intermittent import of_one_device
+from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
+from shiplog.diagnosis.linear import segment_nodes, segments
+from shiplog.diagnosis.noise import likelihood, on_off, raised_noise
+from shiplog.diagnosis.noise.remainder import INTERMITTENT, RAISED, Remainder, noise_prior
+from shiplog.diagnosis.nominal.nominal_reference import Reference
+from shiplog.diagnosis.trial.fitted import Fit
 
 COUNT = 24
 LEVER = 0.3  # lengths ahead of midship at which the force acts

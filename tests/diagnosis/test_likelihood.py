@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from shiplog.diagnosis import likelihood, noise_estimate
-from shiplog.diagnosis.likelihood import ProcessNoise
-from shiplog.diagnosis.linear_segments import Linear, Path
-from shiplog.diagnosis.nominal_reference import inflation, marginal, nominal_information
-from shiplog.diagnosis.segments import Cut
-from shiplog.voyages.timescale import KNOT
+from shiplog.diagnosis.linear.linear_segments import Linear, Path
+from shiplog.diagnosis.linear.segments import Cut
+from shiplog.diagnosis.noise import likelihood, noise_estimate
+from shiplog.diagnosis.noise.likelihood import ProcessNoise
+from shiplog.diagnosis.nominal.nominal_reference import inflation, marginal, nominal_information
+from shiplog.voyages.rows.timescale import KNOT
 
 NOISE = np.array([0.02, 0.01, 0.03, 0.015, 0.004, 0.002])
 PROCESS_NOISE = ProcessNoise(NOISE, np.array([0.8, 0.5, 0.3]), 5.0, np.full(6, 1.7))

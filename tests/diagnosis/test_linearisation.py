@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from toy_ship import DAMP, GRID, RECORD, ROWS, SETTING, THETA, TURN, Coasting, Toy, path
 
-from shiplog.diagnosis import linearisation, measurement_correction, segments
-from shiplog.diagnosis.linear_segments import Path
+from shiplog.diagnosis.linear import linearisation, measurement_correction, segments
+from shiplog.diagnosis.linear.linear_segments import Path
 from shiplog.models.causes.sensors import AntennaOffset, HeadingOffset
 from shiplog.models.causes.ship import RudderDelay, RudderLag
-from shiplog.voyages.recording import Record
+from shiplog.voyages.rows.recording import Record
 
 
 def test_the_integration_is_of_second_order():

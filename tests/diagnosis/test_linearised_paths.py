@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from toy_ship import GRID, RECORD, ROWS, SETTING, THETA, WIDE, Coasting, Toy, path
 
-from shiplog.diagnosis import linearisation, measurement_correction, segments
-from shiplog.diagnosis.linear_segments import Path
-from shiplog.diagnosis.segments import Cut
-from shiplog.voyages.timescale import KNOT, Timescale
+from shiplog.diagnosis.linear import linearisation, measurement_correction, segments
+from shiplog.diagnosis.linear.linear_segments import Path
+from shiplog.diagnosis.linear.segments import Cut
+from shiplog.voyages.rows.timescale import KNOT, Timescale
 
 
 def simulated(at: Path, theta: np.ndarray = THETA) -> Cut:

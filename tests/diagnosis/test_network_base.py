@@ -7,23 +7,25 @@ import numpy as np
 import pytest
 from safetensors.numpy import load_file, save_file
 
-from pipelines.diagnose import diagnose_run
 from pipelines.experiments.simulated_ship import cases, sensors
-from pipelines.prepare import ingest_logs
-from pipelines.train_networks import train_run
-from shiplog.diagnosis import evidence, fits, network_base, setup
-from shiplog.diagnosis import trial_voyages as trials
-from shiplog.diagnosis.fitted import Fit
-from shiplog.diagnosis.held_out import HeldOut
-from shiplog.diagnosis.remainder import Remainder
-from shiplog.diagnosis.setup import trial_of
-from shiplog.diagnosis.trial_voyages import in_ship_time, record_of
+from shiplog.commands.diagnose import diagnose_run
+from shiplog.commands.prepare import ingest_logs
+from shiplog.commands.train_networks import train_run
+from shiplog.diagnosis.hypotheses import evidence, fits
+from shiplog.diagnosis.noise.remainder import Remainder
+from shiplog.diagnosis.trial import setup
+from shiplog.diagnosis.trial import trial_voyages as trials
+from shiplog.diagnosis.trial.fitted import Fit
+from shiplog.diagnosis.trial.setup import trial_of
+from shiplog.diagnosis.trial.trial_voyages import in_ship_time, record_of
+from shiplog.diagnosis.verdict import network_base
+from shiplog.diagnosis.verdict.held_out import HeldOut
 from shiplog.exceptions import RunError
-from shiplog.report.verdict_sentence import less
-from shiplog.training import extension_file, load_model
-from shiplog.training.run_config import Config, Fast, NetworkSettings
-from shiplog.voyages.split_settings import Split
-from shiplog.voyages.store import Store
+from shiplog.report.diagnosis.verdict_sentence import less
+from shiplog.training.runs import extension_file, load_model
+from shiplog.training.settings.run_config import Config, Fast, NetworkSettings
+from shiplog.voyages.store.store import Store
+from shiplog.voyages.windows.split_settings import Split
 
 pytestmark = pytest.mark.usefixtures("trained_here")
 SEED = 7101

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from toy_ship import PROFILE
 
-from shiplog.diagnosis import next_manoeuvre
-from shiplog.voyages.timescale import Timescale
+from shiplog.diagnosis.residual import next_manoeuvre
+from shiplog.voyages.rows.timescale import Timescale
 
 
 @pytest.mark.parametrize("counts", [1.0, 0.25])

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from toy_ship import RECORD, SETTING, THETA, Toy
 
-from shiplog import disk_cache
-from shiplog.diagnosis import nominal_cache
+from shiplog.diagnosis.nominal import nominal_cache
+from shiplog.machine import disk_cache
 from shiplog.models.causes.sensors import HeadingOffset
 from shiplog.models.starting_values import Start
-from shiplog.voyages.timescale import Timescale
+from shiplog.voyages.rows.timescale import Timescale
 
 START = Start(THETA, 0.1 * THETA, np.full(4, -1.0), np.ones(4))
 

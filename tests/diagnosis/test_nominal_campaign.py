@@ -8,23 +8,21 @@ import pytest
 import straight
 from straight import CAUSES, PROCESS_NOISE, SETTING
 
-from shiplog.diagnosis import (
+from shiplog.diagnosis.linear import segments
+from shiplog.diagnosis.linear.parameter_layout import Columns
+from shiplog.diagnosis.noise import campaign_parts, discrepancy, likelihood
+from shiplog.diagnosis.noise.campaign_parts import FEWEST_PARTS, parts_of
+from shiplog.diagnosis.noise.discrepancy import Discrepancy
+from shiplog.diagnosis.nominal import (
     campaign_characteristics,
-    campaign_parts,
-    discrepancy,
-    likelihood,
     nominal_campaign,
     nominal_fit,
     nominal_reference,
-    segments,
     voyage_effects,
 )
-from shiplog.diagnosis.campaign_characteristics import groups_of
-from shiplog.diagnosis.campaign_parts import FEWEST_PARTS, parts_of
-from shiplog.diagnosis.campaign_prior import prior
-from shiplog.diagnosis.discrepancy import Discrepancy
-from shiplog.diagnosis.nominal_fit import Converged
-from shiplog.diagnosis.parameter_layout import Columns
+from shiplog.diagnosis.nominal.campaign_characteristics import groups_of
+from shiplog.diagnosis.nominal.campaign_prior import prior
+from shiplog.diagnosis.nominal.nominal_fit import Converged
 from shiplog.models.causes import CATALOGUE
 from shiplog.models.starting_values import Start
 

@@ -8,8 +8,8 @@ import pytest
 import straight
 from straight import CAUSES, SETTING
 
-from shiplog.diagnosis import nominal_fit
-from shiplog.diagnosis.nominal_fit import within
+from shiplog.diagnosis.nominal import nominal_fit
+from shiplog.diagnosis.nominal.nominal_fit import within
 from shiplog.models.starting_values import Start
 
 BEGIN = 3.0  # of the coefficient; its true value is 0

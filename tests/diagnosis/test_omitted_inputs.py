@@ -5,8 +5,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from shiplog.diagnosis import omitted_inputs
-from shiplog.diagnosis.residual_acceleration import ACCELERATIONS
+from shiplog.diagnosis.noise.residual_acceleration import ACCELERATIONS
+from shiplog.diagnosis.residual import omitted_inputs
 
 KNOTS = 250  # of 2 s a voyage
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from shiplog.diagnosis import on_off
+from shiplog.diagnosis.noise import on_off
 
 KNOTS = 16
 

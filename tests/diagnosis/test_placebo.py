@@ -7,9 +7,9 @@ import pytest
 import straight
 from straight import CAUSES
 
-from shiplog.diagnosis.campaign_parts import marginal
-from shiplog.diagnosis.placebo import placebos
-from shiplog.diagnosis.remainder import CHANGE_SIZES
+from shiplog.diagnosis.noise.campaign_parts import marginal
+from shiplog.diagnosis.noise.remainder import CHANGE_SIZES
+from shiplog.diagnosis.nominal.placebo import placebos
 
 SHARE = 0.5
 

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 import weighed
 
-from shiplog import profile_file as profiles
-from shiplog.diagnosis import posterior as posteriors
 from shiplog.diagnosis import thresholds
-from shiplog.diagnosis.hypothesis import name_of
-from shiplog.diagnosis.posterior import best_with, posterior, share_of_causes
-from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED
-from shiplog.diagnosis.unrecorded_thruster import SideForce
+from shiplog.diagnosis.hypotheses.hypothesis import name_of
+from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
+from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED
+from shiplog.diagnosis.verdict import posterior as posteriors
+from shiplog.diagnosis.verdict.posterior import best_with, posterior, share_of_causes
 from shiplog.models import causes
 from shiplog.models.causes import Setting
+from shiplog.ship_profile import file as profiles
 
 DRAG, LOAD = ("drag",), ("load",)
 WIND, GNSS = ("clock:wind",), ("clock:gnss",)

@@ -7,9 +7,9 @@ import pytest
 import straight
 import weighed
 
-from shiplog.diagnosis.refutation import judged
-from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED
-from shiplog.diagnosis.unrecorded_thruster import SideForce
+from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
+from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED
+from shiplog.diagnosis.verdict.refutation import judged
 from shiplog.simulation.error_reduction import Gain
 
 DRAG, LOAD, TWO = ("drag",), ("load",), ("two",)

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shiplog.diagnosis import evidence, relinearisation
-from shiplog.diagnosis.fitted import Found
-from shiplog.diagnosis.relinearisation import RELINEARISATIONS, converge
+from shiplog.diagnosis.hypotheses import evidence, relinearisation
+from shiplog.diagnosis.hypotheses.relinearisation import RELINEARISATIONS, converge
+from shiplog.diagnosis.trial.fitted import Found
 
 NOISE = 0.1
 

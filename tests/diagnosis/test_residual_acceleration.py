@@ -6,12 +6,13 @@ import afloat
 import numpy as np
 import pytest
 
-from shiplog.diagnosis import residual_acceleration, segments
-from shiplog.diagnosis.likelihood import ProcessNoise
-from shiplog.diagnosis.linear_segments import Linear, Path
-from shiplog.diagnosis.segments import Cut
+from shiplog.diagnosis.linear import segments
+from shiplog.diagnosis.linear.linear_segments import Linear, Path
+from shiplog.diagnosis.linear.segments import Cut
+from shiplog.diagnosis.noise import residual_acceleration
+from shiplog.diagnosis.noise.likelihood import ProcessNoise
 from shiplog.models.mmg import body
-from shiplog.voyages.recording import Record
+from shiplog.voyages.rows.recording import Record
 
 PROCESS_NOISE = ProcessNoise(
     noise=np.full(6, 3e-4), acceleration=np.array([2e-3, 1e-3, 4e-4]), time=5.0, start=np.ones(6)

@@ -9,13 +9,14 @@ import pytest
 from searchable import raised_noise, search_of, searched, trial_with
 from straight import CAUSES
 
-from shiplog.diagnosis import hypotheses, weighing
-from shiplog.diagnosis import posterior as posteriors
-from shiplog.diagnosis import search as searching
-from shiplog.diagnosis.decide import decide
-from shiplog.diagnosis.fitted import Point
-from shiplog.diagnosis.remainder import NOMINAL, RAISED, Remainder
-from shiplog.diagnosis.search import Search
+from shiplog.diagnosis.hypotheses import search as searching
+from shiplog.diagnosis.hypotheses import table as hypotheses
+from shiplog.diagnosis.hypotheses import weighing
+from shiplog.diagnosis.hypotheses.search import Search
+from shiplog.diagnosis.noise.remainder import NOMINAL, RAISED, Remainder
+from shiplog.diagnosis.trial.fitted import Point
+from shiplog.diagnosis.verdict import posterior as posteriors
+from shiplog.diagnosis.verdict.decide import decide
 
 
 @pytest.fixture(scope="module")

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from toy_ship import GRID, RECORD, ROWS
 
-from shiplog.diagnosis import discrepancy, segment_nodes, segments
-from shiplog.diagnosis.measurement_correction import as_hypothesised, water
+from shiplog.diagnosis.linear import segment_nodes, segments
+from shiplog.diagnosis.linear.measurement_correction import as_hypothesised, water
+from shiplog.diagnosis.noise import discrepancy
 from shiplog.models.causes import Current, WindForce
-from shiplog.voyages.timescale import NODE_ROWS
+from shiplog.voyages.rows.timescale import NODE_ROWS
 
 
 def test_segments_lie_end_to_end_within_stretches():

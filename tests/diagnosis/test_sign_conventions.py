@@ -8,11 +8,11 @@ import polars as pl
 import pytest
 import sailing
 
-from shiplog.diagnosis import sign_conventions
-from shiplog.frames import axes
+from shiplog.diagnosis.verdict import sign_conventions
+from shiplog.nomenclature.frames import axes
 from shiplog.simulation.error_reduction import RUNAWAY
 from shiplog.simulation.extended_simulator import as_record
-from shiplog.voyages.windows import Windows
+from shiplog.voyages.windows.windows import Windows
 
 ORDERS = np.array([0.2, -0.1, 8.0])  # two rudders and a propeller
 KINDS = ("rudder", "rudder", "propeller")

@@ -10,10 +10,11 @@ import straight
 from dense_trial import DRAG, SHARE, gaussian, level, nats, of_noise
 from straight import PROCESS_NOISE
 
-from shiplog.diagnosis import bounds, campaign_parts, evidence, fits
-from shiplog.diagnosis.fitted import Fit
-from shiplog.diagnosis.parameter_layout import HELD_INFORMATION
-from shiplog.diagnosis.remainder import NOMINAL, Remainder
+from shiplog.diagnosis.hypotheses import evidence, fits
+from shiplog.diagnosis.linear.parameter_layout import HELD_INFORMATION
+from shiplog.diagnosis.noise import bounds, campaign_parts
+from shiplog.diagnosis.noise.remainder import NOMINAL, Remainder
+from shiplog.diagnosis.trial.fitted import Fit
 
 HYPOTHESES = (
     ((), NOMINAL, 1.0), (("drag",), NOMINAL, 1.0), (("load", "two"), NOMINAL, 1.0),

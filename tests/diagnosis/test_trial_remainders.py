@@ -10,11 +10,12 @@ from dense_trial import SHARE, gaussian, level, nats, of_noise
 from scipy.stats import multivariate_normal, norm
 from straight import CAUSES, PROCESS_NOISE
 
-from shiplog.diagnosis import evidence, fits, remainder, weighing
-from shiplog.diagnosis.discrepancy import EVEN
-from shiplog.diagnosis.fitted import Fit
-from shiplog.diagnosis.hypotheses import Hypotheses
-from shiplog.diagnosis.remainder import INTERMITTENT, RAISED, Remainder
+from shiplog.diagnosis.hypotheses import evidence, fits, weighing
+from shiplog.diagnosis.hypotheses.table import Hypotheses
+from shiplog.diagnosis.noise import remainder
+from shiplog.diagnosis.noise.discrepancy import EVEN
+from shiplog.diagnosis.noise.remainder import INTERMITTENT, RAISED, Remainder
+from shiplog.diagnosis.trial.fitted import Fit
 
 # --- changes
 

@@ -8,14 +8,10 @@ import afloat
 import numpy as np
 import pytest
 
-from shiplog.diagnosis import (
-    likelihood,
-    linear_segments,
-    raised_noise,
-    segments,
-    unrecorded_thruster,
-)
-from shiplog.diagnosis.on_off import Course
+from shiplog.diagnosis.hypotheses import unrecorded_thruster
+from shiplog.diagnosis.linear import linear_segments, segments
+from shiplog.diagnosis.noise import likelihood, raised_noise
+from shiplog.diagnosis.noise.on_off import Course
 
 
 def test_an_unrecorded_thruster_is_placed_where_it_stands(monkeypatch):

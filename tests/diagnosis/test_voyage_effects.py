@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from shiplog.diagnosis import voyage_effects
-from shiplog.diagnosis.voyage_effects import learn, reduced
+from shiplog.diagnosis.nominal import voyage_effects
+from shiplog.diagnosis.nominal.voyage_effects import learn, reduced
 
 
 def products(j: np.ndarray, e: np.ndarray) -> np.ndarray:

@@ -8,10 +8,10 @@ import pytest
 import straight
 from searchable import raised_noise, search_of, trial_with
 
-from shiplog.diagnosis import evidence, fits, weighing
-from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
-from shiplog.diagnosis.unrecorded_thruster import SideForce
-from shiplog.diagnosis.weighing import weigh
+from shiplog.diagnosis.hypotheses import evidence, fits, weighing
+from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
+from shiplog.diagnosis.hypotheses.weighing import weigh
+from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
 
 
 def test_an_intermittent_force_is_tested_with_no_family(monkeypatch):

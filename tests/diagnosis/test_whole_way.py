@@ -13,23 +13,20 @@ import sailing
 from contract_shape import shaped
 from whole_way import PROFILE, apart, labels, truth
 
-from pipelines import diagnose as pipeline
-from pipelines.prepare import ingest_logs
-from shiplog.diagnosis import (
-    evidence,
-    exchanged_twins,
-    next_manoeuvre,
-    setup,
-    sign_conventions,
-)
-from shiplog.diagnosis.fitted import Fit
-from shiplog.diagnosis.held_out import HeldOut
-from shiplog.diagnosis.relinearisation import converge
-from shiplog.diagnosis.remainder import Remainder
-from shiplog.diagnosis.trial import Trial
+from shiplog.commands import diagnose as pipeline
+from shiplog.commands.prepare import ingest_logs
+from shiplog.diagnosis.hypotheses import evidence
+from shiplog.diagnosis.hypotheses.relinearisation import converge
+from shiplog.diagnosis.noise.remainder import Remainder
+from shiplog.diagnosis.residual import next_manoeuvre
+from shiplog.diagnosis.trial import setup
+from shiplog.diagnosis.trial.fitted import Fit
+from shiplog.diagnosis.trial.trial import Trial
+from shiplog.diagnosis.verdict import exchanged_twins, sign_conventions
+from shiplog.diagnosis.verdict.held_out import HeldOut
 from shiplog.exceptions import RunError
-from shiplog.voyages import twins
-from shiplog.voyages.store import Store
+from shiplog.voyages.contradictions import twins
+from shiplog.voyages.store.store import Store
 
 
 def test_a_current_is_named_and_sized(sea):

@@ -7,18 +7,14 @@ import numpy as np
 import pytest
 from whole_way import apart, hidden, judged, labels, truth, turned
 
-from shiplog.diagnosis import (
-    evidence,
-    linearisation,
-    measurement_correction,
-    segments,
-    thresholds,
-)
-from shiplog.diagnosis import result as decisions
-from shiplog.diagnosis.fitted import Found
-from shiplog.diagnosis.relinearisation import converge
-from shiplog.diagnosis.trial import Trial
-from shiplog.voyages import timescale  # fmt: skip
+from shiplog.diagnosis import thresholds
+from shiplog.diagnosis.hypotheses import evidence
+from shiplog.diagnosis.hypotheses.relinearisation import converge
+from shiplog.diagnosis.linear import linearisation, measurement_correction, segments
+from shiplog.diagnosis.trial.fitted import Found
+from shiplog.diagnosis.trial.trial import Trial
+from shiplog.diagnosis.verdict import result as decisions
+from shiplog.voyages.rows import timescale  # fmt: skip
 
 # --- what is hidden, and what is not
 

@@ -5,13 +5,13 @@ from importlib import resources
 from contract_shape import shaped
 from whole_way import hidden, log
 
-from pipelines import diagnose as pipeline
-from pipelines.identify import identify_run
-from pipelines.prepare import ingest_logs
-from shiplog.diagnosis import search
-from shiplog.training.run_config import Config, Physics
-from shiplog.voyages.split import choose_physical_split
-from shiplog.voyages.store import Store
+from shiplog.commands import diagnose as pipeline
+from shiplog.commands.identify import identify_run
+from shiplog.commands.prepare import ingest_logs
+from shiplog.diagnosis.hypotheses import search
+from shiplog.training.settings.run_config import Config, Physics
+from shiplog.voyages.store.store import Store
+from shiplog.voyages.windows.split import choose_physical_split
 
 
 def test_without_wind_sensor_what_needs_it_is_not_tested(tmp_path, monkeypatch):

@@ -7,11 +7,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from shiplog import profile_file as profiles
-from shiplog.diagnosis import segments
-from shiplog.diagnosis.linear_segments import Path, Wide
-from shiplog.diagnosis.segments import Cut
+from shiplog.diagnosis.linear import segments
+from shiplog.diagnosis.linear.linear_segments import Path, Wide
+from shiplog.diagnosis.linear.segments import Cut
 from shiplog.models.causes import Cause, Setting
+from shiplog.ship_profile import file as profiles
 
 PROFILE = profiles.load("esso-osaka")  # rudder and propeller
 SETTING = Setting(PROFILE, {"speed": 0.6, "length": 3.0}, np.zeros((1, 2)), 1.0)

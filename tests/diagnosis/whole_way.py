@@ -6,14 +6,11 @@ from dataclasses import replace
 import pytest
 
 from pipelines.experiments.simulated_ship import Laws, cases, sensors
-from shiplog import profile_file as profiles
-from shiplog.diagnosis import (
-    evidence,
-    placebo,
-    search,
-)
-from shiplog.diagnosis.decide import decide
-from shiplog.diagnosis.trial import Trial
+from shiplog.diagnosis.hypotheses import evidence, search
+from shiplog.diagnosis.nominal import placebo
+from shiplog.diagnosis.trial.trial import Trial
+from shiplog.diagnosis.verdict.decide import decide
+from shiplog.ship_profile import file as profiles
 
 SEED = 7101
 PROFILE = profiles.load("esso-vectwin")

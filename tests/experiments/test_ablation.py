@@ -18,21 +18,12 @@ from pipelines.experiments.hidden_effects import (
     suites,
     without,
 )
-from shiplog.diagnosis import (
-    baseline_check,
-    campaign_characteristics,
-    discrepancy,
-    nominal_cache,
-    nominal_fit,
-    placebo,
-    posterior,
-    refutation,
-    setup,
-    thresholds,
-    trial_decision,
-    trial_voyages,
-)
-from shiplog.diagnosis.hypothesis import form_error, form_error_of
+from shiplog.diagnosis import thresholds
+from shiplog.diagnosis.hypotheses.hypothesis import form_error, form_error_of
+from shiplog.diagnosis.noise import discrepancy
+from shiplog.diagnosis.nominal import campaign_characteristics, nominal_cache, nominal_fit, placebo
+from shiplog.diagnosis.trial import setup, trial_voyages
+from shiplog.diagnosis.verdict import baseline_check, posterior, refutation, trial_decision
 from shiplog.models.causes import CATALOGUE
 
 

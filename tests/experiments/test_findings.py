@@ -4,13 +4,13 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipelines.convert import convert
-from pipelines.demo import sample_logs
 from pipelines.experiments.findings import faults, kvlcc2, milliampere
-from pipelines.prepare import expand, ingest_logs
-from shiplog import profile_file as profiles
-from shiplog.voyages import sensor_consistency
-from shiplog.voyages.store import Store
+from shiplog.commands.convert import convert
+from shiplog.commands.demo import sample_logs
+from shiplog.commands.prepare import expand, ingest_logs
+from shiplog.ship_profile import file as profiles
+from shiplog.voyages.sensors import sensor_consistency
+from shiplog.voyages.store.store import Store
 
 
 @pytest.mark.shared

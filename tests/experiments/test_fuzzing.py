@@ -4,7 +4,7 @@ import pytest
 
 from pipelines.experiments.fuzzing.__main__ import BEGINNINGS, TARGETS, refused
 from shiplog.exceptions import LogUnreadable, ShiplogError
-from shiplog.logs.read import read
+from shiplog.logs.reading.read import read
 
 FILES = sorted(path for path in BEGINNINGS.rglob("*.*"))
 

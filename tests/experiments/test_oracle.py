@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pipelines.experiments.hidden_effects import oracle
-from shiplog import profile_file as profiles
 from shiplog.models.causes import Setting
+from shiplog.ship_profile import file as profiles
 
 
 def test_the_truth_in_the_catalogues_own_numbers():

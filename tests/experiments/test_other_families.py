@@ -16,7 +16,7 @@ from pipelines.experiments.other_families.disturbance import CALM, Wind, process
 from pipelines.experiments.other_families.effects import RANGES, Effects
 from pipelines.experiments.other_families.ship import NO_WINDAGE, WATER
 from pipelines.experiments.other_families.voyage import sail
-from shiplog.diagnosis import nominal_fit
+from shiplog.diagnosis.nominal import nominal_fit
 from shiplog.models.causes import CATALOGUE, Bank, ShallowWater
 
 FOLDER = Path(other_families.__file__).parent
@@ -215,7 +215,7 @@ def test_nothing_of_shiplog_is_imported_but_the_writer_of_logs():
             names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             for name in names:
                 if name.split(".")[0] == "shiplog":
-                    assert name == "shiplog.logs.write", path
+                    assert name == "shiplog.logs.conversion.write", path
                 if name.split(".")[0] == "pipelines":
                     assert name.startswith("pipelines.experiments.other_families"), path
 

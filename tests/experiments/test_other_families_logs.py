@@ -18,7 +18,7 @@ from pipelines.experiments.other_families import cases, instruments
 from pipelines.experiments.other_families.disturbance import CALM, Wind
 from pipelines.experiments.other_families.effects import Effects
 from pipelines.experiments.other_families.voyage import sail
-from shiplog import profile_file
+from shiplog.ship_profile import file as profile_file
 
 FOLDER = Path(other_families.__file__).parent
 START = datetime(2026, 5, 1, 6, 0, tzinfo=UTC)

@@ -207,5 +207,5 @@ def test_rivals_know_nothing_of_the_simulator():
             continue
         met.add(name)
         waiting += [module for module in imported(source) if module.startswith(OURS)]
-    assert "shiplog.diagnosis.evidence" in met
+    assert "shiplog.diagnosis.hypotheses.evidence" in met
     assert not any(name.startswith("pipelines.experiments.simulated_ship") for name in met)

@@ -12,10 +12,10 @@ import straight
 from jax.typing import ArrayLike
 
 from pipelines.experiments.hidden_effects import rivals
-from shiplog.diagnosis.linear_segments import Linear
-from shiplog.diagnosis.linear_segments import Path as Along
-from shiplog.diagnosis.parameter_layout import Columns
-from shiplog.diagnosis.segments import BIN, Cut
+from shiplog.diagnosis.linear.linear_segments import Linear
+from shiplog.diagnosis.linear.linear_segments import Path as Along
+from shiplog.diagnosis.linear.parameter_layout import Columns
+from shiplog.diagnosis.linear.segments import BIN, Cut
 
 START = np.array([2.0, 0.5, 2.0, 0.5, 0.3, 0.2])
 NOISE = np.array([0.02, 0.01, 0.03, 0.015, 0.004, 0.002])

@@ -215,4 +215,6 @@ def test_it_shares_no_code_with_shiplog_but_the_writer():
                 assert node.level == 0
                 names = [node.module or ""]
             for name in names:
-                assert not name.startswith("shiplog") or name == "shiplog.logs.write", source
+                assert not name.startswith("shiplog") or name == "shiplog.logs.conversion.write", (
+                    source
+                )

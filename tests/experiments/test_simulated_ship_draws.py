@@ -17,11 +17,11 @@ from pipelines.experiments.simulated_ship import (
 from pipelines.experiments.simulated_ship.laws import (
     drawn,
 )
-from shiplog import profile_file as profiles
-from shiplog.diagnosis.nominal_fit import PROCESS_NOISE_TIME_S
+from shiplog.diagnosis.nominal.nominal_fit import PROCESS_NOISE_TIME_S
 from shiplog.models.causes import CATALOGUE, Setting
 from shiplog.models.causes.environment import Bank as CatalogueBank
 from shiplog.models.causes.environment import ShallowWater
+from shiplog.ship_profile import file as profiles
 
 SEEDS = range(300)
 PROFILE = profiles.load("esso-vectwin")

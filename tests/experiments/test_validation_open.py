@@ -8,7 +8,7 @@ from test_validation_scores import answer, key, named, ranked, undecided
 
 from pipelines.experiments.hidden_effects import score_tables, scores
 from pipelines.experiments.hidden_effects.open_answers import open_answers
-from shiplog.report import verdict_sentence
+from shiplog.report.diagnosis import verdict_sentence
 
 
 def said(sentence, **shares):

@@ -16,9 +16,9 @@ from known_motion import KNOT, swinging
 
 from pipelines.experiments.wrong_profiles.profiles import WRONG, Wrong, text_of
 from pipelines.experiments.wrong_profiles.seen import seen
-from shiplog import profile_file
-from shiplog.logs.write import Series, write_log
-from shiplog.voyages.ingest import ingest
+from shiplog.logs.conversion.write import Series, write_log
+from shiplog.ship_profile import file as profile_file
+from shiplog.voyages.ingest.ingest import ingest
 
 BY_NAME = {wrong.name: wrong for wrong in WRONG}
 DATUM, METRE = (34.82, 135.52), 111_000.0

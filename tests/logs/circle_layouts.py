@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from pipelines.convert import convert
-from shiplog import profile_file as profiles
-from shiplog.logs.write import Series, write_log
-from shiplog.voyages.ingest import ingest
+from shiplog.commands.convert import convert
+from shiplog.logs.conversion.write import Series, write_log
+from shiplog.ship_profile import file as profiles
+from shiplog.voyages.ingest.ingest import ingest
 
 START = 1_617_969_600.0  # 2021-04-09 12:00:00 UTC
 SPEED, RATE, RADIUS_M = 2.0, 0.02, 100.0  # m/s, rad/s: half a circle and more in 200 s

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from made_logs import protobuf_log
 
-from shiplog.logs import preflight, rerun_route
-from shiplog.logs.read import read
+from shiplog.logs.reading import preflight, rerun_route
+from shiplog.logs.reading.read import read
 
 
 @pytest.fixture(scope="module")

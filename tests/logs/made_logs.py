@@ -19,8 +19,8 @@ from mcap.writer import CompressionType, Writer
 from mcap_protobuf.decoder import DecoderFactory as ProtobufFactory
 from polars.testing import assert_frame_equal
 
-from shiplog.logs import rerun_route
-from shiplog.logs.read import read
+from shiplog.logs.reading import rerun_route
+from shiplog.logs.reading.read import read
 
 COUNT = 3000
 SECOND = 1_000_000_000

@@ -12,10 +12,10 @@ import pytest
 import zstandard
 from mcap.writer import Writer
 
-from pipelines.convert import convert, draft
-from pipelines.prepare import check_logs, ingest_logs
-from shiplog.logs.read import read
-from shiplog.voyages.store import Store
+from shiplog.commands.convert import convert, draft
+from shiplog.commands.prepare import check_logs, ingest_logs
+from shiplog.logs.reading.read import read
+from shiplog.voyages.store.store import Store
 
 START = 1_700_000_000_000_000_000
 STEP = 100_000_000

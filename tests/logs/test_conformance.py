@@ -17,8 +17,9 @@ import mcap_bytes as mcap
 import pytest
 
 from shiplog.exceptions import LogUnreadable
-from shiplog.logs import salvage, scan
-from shiplog.logs.read import contents, read
+from shiplog.logs.mcap_file import scan
+from shiplog.logs.reading import salvage
+from shiplog.logs.reading.read import contents, read
 
 FEATURES = ("ch", "mx", "st", "rsh", "rch", "ax", "mdx", "chx", "sum", "pad")
 PADDING = b"\x01\x02\x03"  # what `pad` appends to records that a newer version may extend

@@ -7,15 +7,15 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipelines.convert import convert
-from shiplog import profile_file as profiles
+from shiplog.commands.convert import convert
 from shiplog.exceptions import ChannelMissing, ProfileError
 from shiplog.logs.conversion import clock, heartbeat
 from shiplog.logs.conversion.columns import schema_of
 from shiplog.logs.conversion.delimited import read_table
 from shiplog.logs.conversion.nmea import is_nmea, read_nmea
 from shiplog.logs.conversion.topics import folder_to_series
-from shiplog.voyages.ingest import ingest
+from shiplog.ship_profile import file as profiles
+from shiplog.voyages.ingest.ingest import ingest
 
 
 @pytest.mark.parametrize(

@@ -14,8 +14,8 @@ from mcap.writer import CompressionType
 from polars.testing import assert_frame_equal
 
 from shiplog.exceptions import LogUnreadable
-from shiplog.logs.check import check
-from shiplog.logs.read import contents, fields, read
+from shiplog.logs.reading.check import check
+from shiplog.logs.reading.read import contents, fields, read
 
 
 def test_damaged_and_whole_logs_agree_on_what_both_have(good, tmp_path):

@@ -3,13 +3,13 @@
 import pytest
 from test_conversion import PROFILE
 
-from pipelines.convert import convert
-from shiplog import profile_file as profiles
+from shiplog.commands.convert import convert
 from shiplog.exceptions import ChannelMissing
 from shiplog.logs.conversion.delimited import read_table
 from shiplog.logs.conversion.topics import folder_to_series
-from shiplog.logs.read import contents
-from shiplog.voyages.ingest import ingest
+from shiplog.logs.reading.read import contents
+from shiplog.ship_profile import file as profiles
+from shiplog.voyages.ingest.ingest import ingest
 
 HEADER = "t,x,y,u,v,psi"
 ROWS = [f"{i / 10},{i},0.5,1.25,0.25,5.5" for i in range(100)]

@@ -11,12 +11,12 @@ import polars as pl
 import pytest
 import sailing
 
-from pipelines.convert import convert, draft
-from pipelines.prepare import check_logs, ingest_logs
-from shiplog import profile_file as profiles
+from shiplog.commands.convert import convert, draft
+from shiplog.commands.prepare import check_logs, ingest_logs
 from shiplog.exceptions import LogUnreadable
-from shiplog.logs import packed
-from shiplog.voyages.store import Store
+from shiplog.logs.conversion import packed
+from shiplog.ship_profile import file as profiles
+from shiplog.voyages.store.store import Store
 
 
 def zipped(**files: str | bytes) -> bytes:

@@ -10,8 +10,8 @@ from mcap_ros2.decoder import DecoderFactory as Ros2Factory
 from polars.testing import assert_frame_equal
 
 from shiplog.exceptions import LogUnreadable
-from shiplog.logs.check import check
-from shiplog.logs.read import fields, read
+from shiplog.logs.reading.check import check
+from shiplog.logs.reading.read import fields, read
 
 EXPECTED_REFUSALS = {"keelson_klog_2024-05-15_eol_mangled", "rosbag2_wrong_rmw_test_0"}
 

@@ -10,8 +10,8 @@ from mcap.records import Schema
 from mcap.writer import Writer
 
 from shiplog.exceptions import LogUnreadable
-from shiplog.logs import json_text, messages, protobuf
-from shiplog.logs.read import read
+from shiplog.logs.decoding import json_text, messages, protobuf
+from shiplog.logs.reading.read import read
 
 START = 1_700_000_000_000_000_000
 RULE = "=" * 80

@@ -23,9 +23,9 @@ from circle_layouts import (
     same,
 )
 
-from pipelines.convert import convert
-from shiplog import profile_file as profiles
-from shiplog.logs.read import contents, read
+from shiplog.commands.convert import convert
+from shiplog.logs.reading.read import contents, read
+from shiplog.ship_profile import file as profiles
 
 STEPS = np.arange(20.0)
 

@@ -24,10 +24,10 @@ from circle_layouts import (
     same,
 )
 
-from pipelines.convert import convert
-from shiplog import files
-from shiplog import profile_file as profiles
-from shiplog.logs.read import read
+from shiplog.commands.convert import convert
+from shiplog.logs.reading.read import read
+from shiplog.machine import files
+from shiplog.ship_profile import file as profiles
 
 
 def sentence(body: str) -> str:

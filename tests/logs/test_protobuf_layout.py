@@ -13,8 +13,8 @@ from made_logs import DESCRIPTORS, KIND, Kind, sample
 from mcap.records import Schema
 from polars.testing import assert_frame_equal
 
-from shiplog.logs import protobuf
-from shiplog.logs.protobuf_layout import FlatMessages
+from shiplog.logs.decoding import protobuf
+from shiplog.logs.decoding.protobuf_layout import FlatMessages
 
 NUMBERS = (
     "timestamp.seconds", "timestamp.nanos", "value", "small", "signed", "negative", "large", "on",
@@ -237,7 +237,7 @@ def test_damaged_bytes_are_as_the_package_has_them():
 
 
 def test_more_layouts_than_it_keeps(monkeypatch, asked):
-    monkeypatch.setattr("shiplog.logs.protobuf_layout.MOST_LAYOUTS", 2)
+    monkeypatch.setattr("shiplog.logs.decoding.protobuf_layout.MOST_LAYOUTS", 2)
     payloads = [plain(k) for k in range(200)]
     assert_as_the_package(payloads)
     assert len(asked) > 200

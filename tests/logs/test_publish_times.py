@@ -4,8 +4,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from shiplog.logs import faults
-from shiplog.logs.health_report import Finding
+from shiplog.logs.health import faults
+from shiplog.logs.health.health_report import Finding
 
 SECOND = 1_000_000_000
 START = 1_700_000_000 * SECOND

@@ -27,11 +27,12 @@ from mcap.writer import CompressionType, IndexType, Writer
 from polars.testing import assert_frame_equal
 
 from shiplog.exceptions import LogUnreadable
-from shiplog.logs import chunks as chunks_module
-from shiplog.logs import preflight, read_ahead, rerun_route, scan
-from shiplog.logs.check import check
-from shiplog.logs.container import Index, Sound
-from shiplog.logs.read import contents, fields, read
+from shiplog.logs.mcap_file import chunks as chunks_module
+from shiplog.logs.mcap_file import read_ahead, scan
+from shiplog.logs.mcap_file.container import Index, Sound
+from shiplog.logs.reading import preflight, rerun_route
+from shiplog.logs.reading.check import check
+from shiplog.logs.reading.read import contents, fields, read
 
 
 def test_a_good_log_is_read_whole_and_as_the_protobuf_package_reads_it(good):

@@ -9,7 +9,7 @@ import mcap_bytes as mcap
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shiplog.logs import records
+from shiplog.logs.mcap_file import records
 
 # Stretches of records of one kind and length, as many as are looked for at once and more; and what
 # stands between them: records of any kind, and of the same length by chance.

@@ -16,8 +16,8 @@ from mcap.writer import IndexType
 from mcap_ros2.writer import Writer as Ros2Writer
 from polars.testing import assert_frame_equal
 
-from shiplog.logs import rerun_route
-from shiplog.logs.read import read
+from shiplog.logs.reading import rerun_route
+from shiplog.logs.reading.read import read
 
 
 @pytest.mark.parametrize(
@@ -114,7 +114,7 @@ def test_only_a_clean_log_is_given_to_rerun(tmp_path, by_rerun):
 SCRIPT = """
 import sys
 from shiplog.logs import rerun_route
-from shiplog.logs.read import read
+from shiplog.logs.reading.read import read
 rerun_route.LEAST_MESSAGES = 0
 assert "numba" not in sys.modules and "rerun" not in sys.modules
 print(read(sys.argv[1]).health.messages_read, rerun_route.worker()._process.pid)

@@ -12,8 +12,8 @@ from mcap.writer import Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from shiplog.exceptions import LogUnreadable
-from shiplog.logs.check import check
-from shiplog.logs.read import fields, read
+from shiplog.logs.reading.check import check
+from shiplog.logs.reading.read import fields, read
 
 START = 1_700_000_000_000_000_000
 RULE = "\n" + "=" * 80 + "\n"

@@ -31,8 +31,8 @@ from salvaged_logs import (
 )
 
 from shiplog.exceptions import LogUnreadable
-from shiplog.logs import scan
-from shiplog.logs.read import contents, read
+from shiplog.logs.mcap_file import scan
+from shiplog.logs.reading.read import contents, read
 
 DAMAGE = {  # the file, and the chunks of which nothing can be read
     "whole": (GOOD, ()),

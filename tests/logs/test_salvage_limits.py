@@ -11,7 +11,7 @@ import zstandard
 from salvaged_logs import CHUNKS, EACH, GOOD, START, file, numbers, packed, parts, without
 
 from shiplog.exceptions import LogUnreadable
-from shiplog.logs import chunks, records, scan
+from shiplog.logs.mcap_file import chunks, records, scan
 
 
 def bomb(size: int, head: bytes = b"", stated: int | None = None, crc: int | None = 0) -> bytes:
@@ -53,8 +53,8 @@ def test_a_message_that_is_too_large_is_counted_and_left_out(reading):
 
 
 def test_more_messages_than_a_file_of_its_size_holds_are_counted_and_left_out(reading, monkeypatch):
-    monkeypatch.setattr("shiplog.logs.tables.LEAST_ROWS", 60)
-    monkeypatch.setattr("shiplog.logs.tables.ROWS_PER_BYTE", 0.0)
+    monkeypatch.setattr("shiplog.logs.decoding.tables.LEAST_ROWS", 60)
+    monkeypatch.setattr("shiplog.logs.decoding.tables.ROWS_PER_BYTE", 0.0)
     found = reading(GOOD)
     assert found.health.messages_read == CHUNKS * EACH
     assert sum(frame.height for frame in found.frames.values()) <= 60
@@ -62,8 +62,8 @@ def test_more_messages_than_a_file_of_its_size_holds_are_counted_and_left_out(re
 
 
 def test_a_log_of_nothing_but_too_many_messages_is_refused_with_the_reason(reading, monkeypatch):
-    monkeypatch.setattr("shiplog.logs.tables.LEAST_ROWS", 0)
-    monkeypatch.setattr("shiplog.logs.tables.ROWS_PER_BYTE", 0.0)
+    monkeypatch.setattr("shiplog.logs.decoding.tables.LEAST_ROWS", 0)
+    monkeypatch.setattr("shiplog.logs.decoding.tables.ROWS_PER_BYTE", 0.0)
     with pytest.raises(LogUnreadable, match="more than a log of its size can hold"):
         reading(GOOD)
 
@@ -72,8 +72,8 @@ def test_a_chunk_of_more_messages_than_a_log_can_hold_is_counted_and_none_is_mad
     reading, monkeypatch
 ):
     """Empty messages on two channels, packed to nothing; the sound log around them is read."""
-    monkeypatch.setattr("shiplog.logs.tables.LEAST_ROWS", 1000)
-    monkeypatch.setattr("shiplog.logs.tables.ROWS_PER_BYTE", 0.0)
+    monkeypatch.setattr("shiplog.logs.decoding.tables.LEAST_ROWS", 1000)
+    monkeypatch.setattr("shiplog.logs.decoding.tables.ROWS_PER_BYTE", 0.0)
     made = Counter()
     whole = records.record
     monkeypatch.setattr(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from made_nmea import SPEED, START, gga, hdt, heading, iso, kinds, late, rmc, rudder, where
 
-from pipelines.convert import convert
+from shiplog.commands.convert import convert
 from shiplog.exceptions import ChannelMissing
 from shiplog.logs.conversion.signalk import is_signalk, read_signalk
 

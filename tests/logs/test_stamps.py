@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from made_logs import SECOND, START, json_log
 
-from shiplog.logs import salvage
-from shiplog.logs.read import read
+from shiplog.logs.reading import salvage
+from shiplog.logs.reading.read import read
 
 
 @pytest.mark.parametrize(

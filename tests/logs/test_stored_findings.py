@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from made_nmea import gga, hdt, rmc, sentence
 
-from pipelines.convert import convert
-from shiplog import profile_file as profiles
-from shiplog.logs.check import check
-from shiplog.logs.health_report import Finding
-from shiplog.logs.stored_findings import MOST, as_record, of_record
-from shiplog.logs.write import Series, write_log
-from shiplog.voyages.ingest import ingest
+from shiplog.commands.convert import convert
+from shiplog.logs.conversion.write import Series, write_log
+from shiplog.logs.health.health_report import Finding
+from shiplog.logs.health.stored_findings import MOST, as_record, of_record
+from shiplog.logs.reading.check import check
+from shiplog.ship_profile import file as profiles
+from shiplog.voyages.ingest.ingest import ingest
 
 PROFILE = """[ship]
 name = "t"
@@ -78,7 +78,7 @@ def test_a_contradiction_of_the_compass_is_serious(tmp_path):
 
 
 def test_a_log_without_findings_has_no_record(tmp_path):
-    from shiplog.logs.read import contents
+    from shiplog.logs.reading.read import contents
 
     one = Series("/gyro", "shiplog.Gyro", np.arange(3) + 10**18, {"heading_deg": np.zeros(3)})
     write_log(tmp_path / "a.mcap", [one], ship="t")

@@ -3,12 +3,12 @@
 import polars as pl
 import pytest
 
-from pipelines.convert import convert
-from shiplog import profile_file as profiles
+from shiplog.commands.convert import convert
+from shiplog.drafting import draft_table
 from shiplog.exceptions import ProfileError
 from shiplog.logs.conversion import cells
-from shiplog.logs.read import read
-from shiplog.voyages.draft_profile import draft_table
+from shiplog.logs.reading.read import read
+from shiplog.ship_profile import file as profiles
 
 PROFILE = """[ship]
 name = "s"

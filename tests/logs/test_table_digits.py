@@ -3,10 +3,10 @@
 import pytest
 from test_conversion import PROFILE
 
-from pipelines.convert import convert
-from shiplog import profile_file as profiles
+from shiplog.commands.convert import convert
+from shiplog.drafting import draft_table
 from shiplog.logs.conversion.delimited import read_table
-from shiplog.voyages.draft_profile import draft_table
+from shiplog.ship_profile import file as profiles
 
 
 def table(tmp_path, text):

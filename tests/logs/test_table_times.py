@@ -9,12 +9,12 @@ import polars as pl
 import pytest
 from test_conversion import PROFILE
 
-from pipelines.convert import convert
-from shiplog import profile_file as profiles
+from shiplog.commands.convert import convert
 from shiplog.exceptions import ProfileError
-from shiplog.logs import fields
 from shiplog.logs.conversion import clock
-from shiplog.logs.read import read
+from shiplog.logs.decoding import fields
+from shiplog.logs.reading.read import read
+from shiplog.ship_profile import file as profiles
 
 NOON = 1_617_969_600_000_000_000  # 2021-04-09 12:00:00 UTC, ns
 

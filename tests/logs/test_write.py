@@ -16,8 +16,8 @@ from mcap_protobuf.decoder import DecoderFactory
 from rerun.chunk import McapReader
 
 from shiplog.exceptions import ShiplogError
-from shiplog.logs import write
-from shiplog.logs.write import SCHEMAS, Series, write_log
+from shiplog.logs.conversion import write
+from shiplog.logs.conversion.write import SCHEMAS, Series, write_log
 
 START = 1_700_000_000_123_456_789
 AWKWARD = np.array([0.0, -0.0, math.nan, math.inf, -math.inf, 5e-324, 0.1, -179.99999999999997])

@@ -7,12 +7,12 @@ import polars as pl
 import pytest
 from test_conversion import PROFILE
 
-from pipelines.convert import convert
-from shiplog import profile_file as profiles
+from shiplog.commands.convert import convert
+from shiplog.drafting import draft_table
 from shiplog.exceptions import ProfileError
 from shiplog.logs.conversion import clock
 from shiplog.logs.conversion.written_times import LETTERS
-from shiplog.voyages.draft_profile import draft_table
+from shiplog.ship_profile import file as profiles
 
 START = datetime(2024, 6, 1, 10, 0, 0, 0)
 ROWS = [START + timedelta(seconds=0.1 * i) for i in range(50)]

@@ -4,12 +4,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from shiplog import profile_file as profiles
 from shiplog.models import mmg
 from shiplog.models.causes import CATALOGUE, Setting
 from shiplog.models.compiled_network import Network
 from shiplog.models.extended import Extended
-from shiplog.profile import Profile
+from shiplog.ship_profile import file as profiles
+from shiplog.ship_profile.profile import Profile
 
 TWIN = profiles.load("esso-vectwin")  # velocity over ground, by an antenna 0.3 m ahead
 SINGLE = profiles.load("esso-osaka")  # velocity in body axes, at midship; one rudder

@@ -3,10 +3,10 @@
 import pytest
 from mmg_ships import TWIN, Ship, estimated
 
-from shiplog import profile_file as profiles
 from shiplog.models.mmg import parameters
 from shiplog.models.mmg.geometry import geometry_of
 from shiplog.models.mmg.model import MMG
+from shiplog.ship_profile import file as profiles
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from shiplog.models.mmg import parameters
 from shiplog.models.mmg.geometry import geometry_of
 from shiplog.models.mmg.model import MMG
 from shiplog.models.mmg.parameters import Parameters
-from shiplog.profile import Profile
+from shiplog.ship_profile.profile import Profile
 
 SENSORS = """
 [ship]

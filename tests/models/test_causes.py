@@ -24,7 +24,7 @@ from cause_ships import (
 from shiplog.models.causes import CATALOGUE
 from shiplog.models.causes.environment import Current
 from shiplog.models.causes.ship import Payload
-from shiplog.voyages.recording import Record
+from shiplog.voyages.rows.recording import Record
 
 DEGREE = math.pi / 180.0
 

@@ -8,7 +8,7 @@ from test_causes import CHANGED
 
 from shiplog.models.causes import CATALOGUE
 from shiplog.models.causes.ship import RudderDelay, RudderLag, RudderOffset
-from shiplog.voyages.recording import Record
+from shiplog.voyages.rows.recording import Record
 
 # --- sensors: the test bends them by hand ---------------------------------------------------------
 

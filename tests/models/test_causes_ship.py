@@ -24,7 +24,7 @@ from cause_ships import (
 from shiplog.models import mmg
 from shiplog.models.causes.environment import Current
 from shiplog.models.causes.ship import Payload
-from shiplog.profile import Profile
+from shiplog.ship_profile.profile import Profile
 
 # --- the ship -------------------------------------------------------------------------------------
 

@@ -7,13 +7,13 @@ import pytest
 from cause_ships import BY, EVERY, FERRY, PLACES, SINGLE, TWIN, acceleration, setting
 from test_causes import CHANGED
 
-from shiplog import profile_file as profiles
 from shiplog.models import causes as catalogue
 from shiplog.models import mmg
 from shiplog.models.causes import CATALOGUE, Setting
 from shiplog.models.extended import Extended
-from shiplog.profile import Profile
-from shiplog.voyages.recording import Record
+from shiplog.ship_profile import file as profiles
+from shiplog.ship_profile.profile import Profile
+from shiplog.voyages.rows.recording import Record
 
 # --- which cannot be tested -----------------------------------------------------------------------
 

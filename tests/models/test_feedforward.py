@@ -5,11 +5,11 @@ import pytest
 import torch
 from small_networks import by_autograd, network, windows
 
-from shiplog.frames import in_earth_axes
 from shiplog.models import compiled_network
 from shiplog.models.base import kinematics
 from shiplog.models.feedforward import exogenous
 from shiplog.models.network_shape import Shape
+from shiplog.nomenclature.frames import in_earth_axes
 from shiplog.simulation import scoring
 from shiplog.simulation.rollout import rollout, simulate
 

@@ -8,12 +8,12 @@ import polars as pl
 import pytest
 from hybrid_ship import COUNT, PHYSICS, PROFILE, SHIP, SIZE, THETA, WIDTH, flat, sailed
 
-from shiplog import profile_file as profiles
 from shiplog.models.hybrid import Hybrid, anchored, first_weights, weight_spread
 from shiplog.models.mmg import MMG, estimated, geometry_of
+from shiplog.ship_profile import file as profiles
 from shiplog.simulation import coverage, force_breakdown, sensitivities
 from shiplog.simulation.sensitivities import Simulator, WindowSeries
-from shiplog.training import hybrid_training
+from shiplog.training.physics import hybrid_training
 
 
 @pytest.fixture(scope="module")

@@ -7,10 +7,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from shiplog import profile_file as profiles
 from shiplog.models.mmg import body
 from shiplog.models.mmg.geometry import Geometry, geometry_of
 from shiplog.models.mmg.model import MMG
+from shiplog.ship_profile import file as profiles
 
 # ---------------------------------------------------------------- published states
 

@@ -5,11 +5,11 @@ import math
 import pytest
 from mmg_ships import TUNNEL, TWIN, Ship, estimated
 
-from shiplog import profile_file as profiles
 from shiplog.exceptions import ProfileError
 from shiplog.models.mmg import parameters
 from shiplog.models.mmg.geometry import geometry_of
 from shiplog.models.mmg.model import MMG
+from shiplog.ship_profile import file as profiles
 
 # ---------------------------------------------------------------- propeller
 

@@ -5,11 +5,11 @@ from math import isfinite
 
 import pytest
 
-from shiplog import profile_file as profiles
 from shiplog.models.mmg import estimate, parameters
 from shiplog.models.mmg.estimate import Particulars
 from shiplog.models.mmg.geometry import geometry_of
-from shiplog.profile import Actuator, Ship, Site
+from shiplog.ship_profile import file as profiles
+from shiplog.ship_profile.profile import Actuator, Ship, Site
 
 ESSO = Particulars(
     length=3.0,

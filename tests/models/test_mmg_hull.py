@@ -7,8 +7,8 @@ import pytest
 from mmg_ships import TUNNEL, Ship, estimated
 from scipy.integrate import quad
 
-from shiplog import profile_file as profiles
 from shiplog.models.mmg.hull import cross_flow
+from shiplog.ship_profile import file as profiles
 
 # ---------------------------------------------------------------- hull
 

@@ -4,10 +4,10 @@ import jax
 import pytest
 from mmg_ships import TUNNEL, TWIN, estimated
 
-from shiplog import profile_file as profiles
 from shiplog.exceptions import ProfileError
 from shiplog.models.mmg import parameters
 from shiplog.models.mmg.geometry import geometry_of, joined, split
+from shiplog.ship_profile import file as profiles
 
 # ---------------------------------------------------------------- geometry
 

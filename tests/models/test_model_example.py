@@ -14,10 +14,10 @@ from commands import call
 
 import shiplog.models
 from pipelines.experiments import simulated_ship
-from shiplog import profile_file as profiles
 from shiplog.models import MODELS
-from shiplog.training import load_model
-from shiplog.training.run_config import Physics
+from shiplog.ship_profile import file as profiles
+from shiplog.training.runs import load_model
+from shiplog.training.settings.run_config import Physics
 
 DOCS = Path(__file__).parents[2] / "docs"
 LINE = re.compile(r'^ +("kt": Kind\(.*\),)$', re.MULTILINE)

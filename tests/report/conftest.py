@@ -5,7 +5,7 @@ import pytest
 from recordings import circle
 
 from shiplog.report import viewer
-from shiplog.report.comparison_data import ComparisonData, DrawnActuator
+from shiplog.report.viewer.comparison_data import ComparisonData, DrawnActuator
 
 
 def rollouts(measured, model, seed):

@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shiplog.diagnosis.fitted import ExpectedEvidence
+from shiplog.diagnosis.trial.fitted import ExpectedEvidence
 from shiplog.models.causes.environment import Bank, Current, WindForce
 from shiplog.models.causes.sensors import HeadingOffset
 from shiplog.models.causes.ship import Fouling, RudderDelay, RudderLag
-from shiplog.report import answer, page, verdict
-from shiplog.report.verdict import Verdict
+from shiplog.report.diagnosis import answer, page, verdict
+from shiplog.report.diagnosis.verdict import Verdict
 
 
 def run_of(*voyages, given=False):

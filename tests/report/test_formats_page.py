@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from shiplog.channels import UNUSABLE, Quality
-from shiplog.logs.health_report import CONTRACT, FINDING_KINDS, Instrument, VoyageReport
-from shiplog.logs.write import LOG_CONTRACT, SCHEMAS
+from shiplog.logs.conversion.write import LOG_CONTRACT, SCHEMAS
+from shiplog.logs.health.health_report import CONTRACT, FINDING_KINDS, Instrument, VoyageReport
 from shiplog.models.causes.user import ANSWERS
-from shiplog.report.verdict import DEPENDS, Verdict
+from shiplog.nomenclature.channels import UNUSABLE, Quality
+from shiplog.report.diagnosis.verdict import DEPENDS, Verdict
 
 PAGE = (Path(__file__).parents[2] / "docs" / "formats.md").read_text(encoding="utf-8")
 WORDS = set(re.findall(r"`([^`]+)`", PAGE))

@@ -6,7 +6,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from shiplog.report.judgement import FEWEST_WINDOWS, force_line, judge
+from shiplog.report.evaluation.judgement import FEWEST_WINDOWS, force_line, judge
 
 
 def errors(losses, off=3.0, turned=10.0) -> pl.DataFrame:

@@ -8,17 +8,17 @@ from types import SimpleNamespace
 import pytest
 import sailing
 
-from pipelines import api, diagnose
-from shiplog.diagnosis.interval import Interval
+from shiplog.commands import api, diagnose
+from shiplog.diagnosis.residual.interval import Interval
 from shiplog.exceptions import StoreError
-from shiplog.logs.health_report import VoyageReport
-from shiplog.report.answer import DiagnosedTrial
-from shiplog.report.text_table import inert, table
-from shiplog.report.verdict import Verdict
+from shiplog.logs.health.health_report import VoyageReport
+from shiplog.report.diagnosis.answer import DiagnosedTrial
+from shiplog.report.diagnosis.verdict import Verdict
+from shiplog.report.evaluation.text_table import inert, table
 from shiplog.report.viewer import album, diagnosis, report
-from shiplog.voyages import catalogue
-from shiplog.voyages.ingest import ingest
-from shiplog.voyages.store import Store
+from shiplog.voyages.ingest.ingest import ingest
+from shiplog.voyages.store import catalogue
+from shiplog.voyages.store.store import Store
 
 HTML = "<img src=x onerror=alert(1)>"
 PICTURE = "![x](http://example.org/x.png)"

@@ -1,7 +1,7 @@
 """What a log's health is in a few lines."""
 
-from shiplog.logs.health_report import Finding, VoyageReport
-from shiplog.report import tables
+from shiplog.logs.health.health_report import Finding, VoyageReport
+from shiplog.report.evaluation import tables
 
 
 def test_counts_are_no_seconds():

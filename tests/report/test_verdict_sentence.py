@@ -1,7 +1,7 @@
 """Sentences of a verdict."""
 
-from shiplog.diagnosis.result import EXPLAIN_MORE, PATTERN, REFUTED
-from shiplog.report.verdict_sentence import sentence
+from shiplog.diagnosis.verdict.result import EXPLAIN_MORE, PATTERN, REFUTED
+from shiplog.report.diagnosis.verdict_sentence import sentence
 from shiplog.simulation.error_reduction import Gain
 
 

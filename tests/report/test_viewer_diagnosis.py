@@ -9,10 +9,11 @@ import polars as pl
 import pytest
 from recordings import entities, rows, scalars
 
-from shiplog.channels import STATE
-from shiplog.report import diagnosis_pictures, viewer
-from shiplog.report.diagnosis_data import AFTER, BEFORE, ERROR_COLUMNS, TRACKS, Exhibit
+from shiplog.nomenclature.channels import STATE
+from shiplog.report import viewer
+from shiplog.report.diagnosis import diagnosis_pictures
 from shiplog.report.viewer import diagnosis
+from shiplog.report.viewer.diagnosis_data import AFTER, BEFORE, ERROR_COLUMNS, TRACKS, Exhibit
 
 BLUE, ORANGE, BLACK = 0x0072B2FF, 0xD55E00FF, 0x191919FF
 

@@ -7,7 +7,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from shiplog import profile_file as profiles
+from shiplog.ship_profile import file as profiles
 from shiplog.simulation import error_breakdown
 from shiplog.simulation.scoring import window_loss
 from shiplog.simulation.sensitivities import WindowSeries

@@ -9,13 +9,13 @@ import numpy as np
 import polars as pl
 import pytest
 
-from shiplog import frames
-from shiplog import profile_file as profiles
 from shiplog.models import mmg
 from shiplog.models.causes.ship import RudderDelay, RudderLag
 from shiplog.models.extended import Extended
+from shiplog.nomenclature import frames
+from shiplog.ship_profile import file as profiles
 from shiplog.simulation.extended_simulator import ExtendedSimulator, Extension
-from shiplog.voyages.windows import Windows
+from shiplog.voyages.windows.windows import Windows
 
 FERRY = profiles.load("milliampere")  # steered by azimuths
 

@@ -9,7 +9,7 @@ import pytest
 from shiplog.models.base import kinematics
 from shiplog.simulation import baselines, scoring
 from shiplog.simulation.rollout import rollout, simulate
-from shiplog.voyages.windows import Windows
+from shiplog.voyages.windows.windows import Windows
 
 
 def drag(state, actuator, wind):

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from coupled_ships import COUPLED, Damped, sailed
 
-from shiplog import profile_file as profiles
 from shiplog.models.mmg import parameters
 from shiplog.models.mmg.geometry import geometry_of
 from shiplog.models.mmg.model import MMG
+from shiplog.ship_profile import file as profiles
 from shiplog.simulation import sensitivities
 from shiplog.simulation.scoring import window_loss
 

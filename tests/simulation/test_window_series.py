@@ -12,7 +12,7 @@ from coupled_ships import Damped, sailed
 
 from shiplog.simulation import sensitivities
 from shiplog.simulation.sensitivities import WindowSeries
-from shiplog.voyages.windows import Windows
+from shiplog.voyages.windows.windows import Windows
 
 # ---------------------------------------------------------------- wind
 

@@ -6,8 +6,8 @@ from boats import COUNT, START, TRUE, WIDE, Boat, Growing, driven, measured
 
 from shiplog.simulation import sensitivities
 from shiplog.simulation.sensitivities import Simulator, WindowSeries
-from shiplog.training.cross_validation import cross_validate, folds
-from shiplog.training.output_error import identify
+from shiplog.training.physics.cross_validation import cross_validate, folds
+from shiplog.training.physics.output_error import identify
 
 
 def test_whole_groups_are_dealt_in_turn():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from shiplog.exceptions import RunError
-from shiplog.training.earlier_runs import kept
+from shiplog.training.runs.earlier_runs import kept
 
 TODAY = ("hull.c_d", "hull.x_u", "rudder.eps", "rudder.inboard", "network.w1_0", "network.c1_0")
 NEUTRAL = {"hull.x_u": 0.0, "rudder.inboard": 1.0}.get

@@ -7,8 +7,8 @@ from hybrid_ship import PHYSICS, SIZE, THETA, WIDTH, flat, sailed
 from shiplog.models.mmg import MMG
 from shiplog.simulation import sensitivities
 from shiplog.simulation.sensitivities import WindowSeries
-from shiplog.training import hybrid_training
-from shiplog.training.output_error import Identified
+from shiplog.training.physics import hybrid_training
+from shiplog.training.physics.output_error import Identified
 
 PULL = 0.002  # m/s² to starboard a unit of thrust: the extra force that no physics know of
 

@@ -7,9 +7,9 @@ import polars as pl
 import pytest
 import torch
 
-from shiplog.training import random_streams
-from shiplog.training.jittering import jittered
-from shiplog.voyages.windows import Windows
+from shiplog.training.network.jittering import jittered
+from shiplog.training.settings import random_streams
+from shiplog.voyages.windows.windows import Windows
 
 
 def still(copies, size=100):

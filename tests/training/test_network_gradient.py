@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_networks import by_autograd, network, windows
 
-from shiplog import channels
 from shiplog.models.feedforward import FeedForward, Scaling, driven_by, exogenous, scaling
 from shiplog.models.network_shape import Shape
-from shiplog.training import kernel, network_gradient
-from shiplog.voyages.windows import Windows
+from shiplog.nomenclature import channels
+from shiplog.training.network import kernel, network_gradient
+from shiplog.voyages.windows.windows import Windows
 
 
 def bodies():

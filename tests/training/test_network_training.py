@@ -7,10 +7,11 @@ import torch
 from small_networks import by_autograd, network, windows
 
 from shiplog.models.network_shape import Shape
-from shiplog.training import network_gradient, random_streams
-from shiplog.training.network_training import fast, paper, shortened
-from shiplog.training.run_config import Config, Fast, Paper
-from shiplog.voyages.split_settings import Split
+from shiplog.training.network import network_gradient
+from shiplog.training.network.network_training import fast, paper, shortened
+from shiplog.training.settings import random_streams
+from shiplog.training.settings.run_config import Config, Fast, Paper
+from shiplog.voyages.windows.split_settings import Split
 
 SHAPE = Shape(3, width=12, depth=2)
 

@@ -3,7 +3,7 @@
 import pytest
 
 from shiplog.exceptions import UsageError
-from shiplog.training.options import TrainOptions
+from shiplog.training.settings.options import TrainOptions
 
 
 @pytest.mark.parametrize(("model", "left"), [("mmg", 1), ("hybrid", 3), ("feedforward", 3)])

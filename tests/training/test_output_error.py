@@ -12,8 +12,8 @@ from boats import COUNT, SIZE, START, TRUE, WIDE, Boat, Growing, driven, measure
 from shiplog.exceptions import ModelError
 from shiplog.simulation import sensitivities
 from shiplog.simulation.sensitivities import WindowSeries
-from shiplog.training import identifiability
-from shiplog.training.output_error import CORRELATION, Identified, identify
+from shiplog.training.physics import identifiability
+from shiplog.training.physics.output_error import CORRELATION, Identified, identify
 
 
 @jax.tree_util.register_static

@@ -4,10 +4,10 @@ import numpy as np
 import polars as pl
 import pytest
 
-from shiplog import profile_file as profiles
-from shiplog.training import plausible_model
-from shiplog.voyages import plausible_measures
-from shiplog.voyages.plausibility import findings
+from shiplog.ship_profile import file as profiles
+from shiplog.training.runs import plausible_model
+from shiplog.voyages.contradictions import plausible_measures
+from shiplog.voyages.contradictions.plausibility import findings
 
 SHIP = profiles.load("blueboat")  # 15 kg, two thrusters
 

@@ -3,7 +3,7 @@
 import subprocess
 from pathlib import Path
 
-from shiplog.training import provenance
+from shiplog.training.runs import provenance
 
 ROOT = Path(__file__).parents[2]
 

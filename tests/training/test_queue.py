@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from shiplog.exceptions import RunError
-from shiplog.training.queue import Task, work
+from shiplog.training.network.queue import Task, work
 
 
 def square(number, report):
@@ -74,7 +74,7 @@ SCRIPT = """
 import sys
 sys.path.insert(0, "FOLDER")
 from test_queue import square
-from shiplog.training.queue import Task, work
+from shiplog.training.network.queue import Task, work
 
 print("once")
 for event in work([Task("a", square, (3,))], 1):
@@ -93,7 +93,7 @@ def test_a_script_that_trains_is_not_run_again_by_each_process(tmp_path):
 
 INTERRUPTED = """
 import multiprocessing.util, signal, sys
-from shiplog.training.queue import Task, cores, work
+from shiplog.training.network.queue import Task, cores, work
 
 began = multiprocessing.util.spawnv_passfds
 

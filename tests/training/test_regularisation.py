@@ -6,9 +6,9 @@ from test_output_error import Straight, driven, measured, noisy
 
 from shiplog.simulation import sensitivities
 from shiplog.simulation.sensitivities import WindowSeries
-from shiplog.training import regularisation
-from shiplog.training.cross_validation import as_good
-from shiplog.training.output_error import Identified, identify
+from shiplog.training.physics import regularisation
+from shiplog.training.physics.cross_validation import as_good
+from shiplog.training.physics.output_error import Identified, identify
 
 FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
 START = np.array([0.05, 0.03, 0.0])

@@ -6,13 +6,14 @@ import sailing
 import torch
 from small_networks import network, windows
 
-from shiplog import files
 from shiplog.exceptions import RunError
+from shiplog.machine import files
 from shiplog.models.network_shape import Shape
-from shiplog.training import load_model, network_files, network_gradient, run_folder
-from shiplog.training.network_training import paper
-from shiplog.training.run_config import Config, NetworkSettings, Paper
-from shiplog.voyages.split_settings import Split
+from shiplog.training.network import network_files, network_gradient
+from shiplog.training.network.network_training import paper
+from shiplog.training.runs import load_model, run_folder
+from shiplog.training.settings.run_config import Config, NetworkSettings, Paper
+from shiplog.voyages.windows.split_settings import Split
 
 PROFILE = sailing.profile()
 SPLIT = Split(training=("a",), validation=("b",))

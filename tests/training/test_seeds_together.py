@@ -7,12 +7,12 @@ import torch
 from small_networks import network, windows
 
 from shiplog.models.network_shape import Shape
-from shiplog.training import network_gradient
-from shiplog.training.job import Training
-from shiplog.training.network_training import paper, paper_done
-from shiplog.training.run_config import Config, Paper
-from shiplog.training.seeds_together import SeedsTogether, advance
-from shiplog.voyages.split_settings import Split
+from shiplog.training.network import network_gradient
+from shiplog.training.network.job import Training
+from shiplog.training.network.network_training import paper, paper_done
+from shiplog.training.network.seeds_together import SeedsTogether, advance
+from shiplog.training.settings.run_config import Config, Paper
+from shiplog.voyages.windows.split_settings import Split
 
 SHAPE = Shape(3, width=12, depth=2)
 CPU = torch.device("cpu")

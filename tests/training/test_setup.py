@@ -8,10 +8,10 @@ import pytest
 
 from shiplog.exceptions import RunError
 from shiplog.models.coefficients import ParameterEntry, parameters
-from shiplog.training import setup
-from shiplog.training.cross_validation import finite_mean
-from shiplog.training.held_out import _sentence
-from shiplog.training.setup import Prepared
+from shiplog.training.physics import setup
+from shiplog.training.physics.cross_validation import finite_mean
+from shiplog.training.physics.held_out import _sentence
+from shiplog.training.physics.setup import Prepared
 
 
 def test_the_sentence_counts_what_may_move():

@@ -9,11 +9,11 @@ import pytest
 import sailing
 
 from shiplog.exceptions import StoreError
-from shiplog.training.run_config import Config
-from shiplog.training.run_folder import RunFolder
-from shiplog.training.voyages_to_test import held_back, say_twins
-from shiplog.voyages import one_hertz
-from shiplog.voyages.split_settings import Split
+from shiplog.training.runs.run_folder import RunFolder
+from shiplog.training.runs.voyages_to_test import held_back, say_twins
+from shiplog.training.settings.run_config import Config
+from shiplog.voyages.rows import one_hertz
+from shiplog.voyages.windows.split_settings import Split
 
 
 @pytest.fixture(scope="module")

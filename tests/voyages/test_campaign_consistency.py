@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 import sailing
 
-from pipelines import sensors
-from shiplog.voyages import campaign_consistency, contradictions, sensor_consistency
-from shiplog.voyages.campaign_consistency import campaign, deviates, seasons, together
-from shiplog.voyages.contradictions import Contradictions
-from shiplog.voyages.ingest import ingest
-from shiplog.voyages.sensor_findings import Estimate
-from shiplog.voyages.store import Store
+from shiplog.commands import sensors
+from shiplog.voyages.contradictions import gross as contradictions
+from shiplog.voyages.contradictions.gross import Contradictions
+from shiplog.voyages.ingest.ingest import ingest
+from shiplog.voyages.sensors import campaign_consistency, sensor_consistency
+from shiplog.voyages.sensors.campaign_consistency import campaign, deviates, seasons, together
+from shiplog.voyages.sensors.sensor_findings import Estimate
+from shiplog.voyages.store.store import Store
 
 DAY = 86_400.0
 

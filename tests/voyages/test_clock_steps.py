@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shiplog.voyages.clock_steps import steps_of
+from shiplog.voyages.clocks.clock_steps import steps_of
 
 T = np.arange(0.0, 300.0, 1.0)  # s
 NOISE = np.random.default_rng(1)

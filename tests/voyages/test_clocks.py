@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import sailing
 
-from shiplog.logs import dates
-from shiplog.logs.check import check
-from shiplog.voyages.ingest import ingest
+from shiplog.logs.health import dates
+from shiplog.logs.reading.check import check
+from shiplog.voyages.ingest.ingest import ingest
 
 SECOND = 1_000_000_000
 DAY = 86_400 * SECOND

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import sailing
 
-from shiplog.channels import UNUSABLE
 from shiplog.exceptions import ProfileError
-from shiplog.logs.write import Series
-from shiplog.voyages import resampling, stamp_steps
-from shiplog.voyages.ingest import ingest
+from shiplog.logs.conversion.write import Series
+from shiplog.nomenclature.channels import UNUSABLE
+from shiplog.voyages.ingest.ingest import ingest
+from shiplog.voyages.rows import resampling, stamp_steps
 
 SECOND = 1_000_000_000
 ORDERS = ((0.0, 0.0), (12.0, 10.0), (31.0, -15.0), (34.0, 0.0), (80.0, 20.0), (92.0, 5.0))

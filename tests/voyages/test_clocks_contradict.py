@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import sailing
 
-from shiplog.channels import UNUSABLE
 from shiplog.exceptions import LogUnreadable
-from shiplog.logs.leap_seconds import gps_utc_s, known_difference
-from shiplog.logs.write import Series
-from shiplog.voyages import ingest as ingesting
-from shiplog.voyages.ingest import ingest
+from shiplog.logs.conversion.write import Series
+from shiplog.logs.health.leap_seconds import gps_utc_s, known_difference
+from shiplog.nomenclature.channels import UNUSABLE
+from shiplog.voyages.ingest import ingest as ingesting
+from shiplog.voyages.ingest.ingest import ingest
 
 SECOND = 1_000_000_000
 GNSS, GYRO = ("/position", "/velocity"), ("/gyro",)
@@ -104,7 +104,7 @@ def test_a_recorder_that_wrote_a_replay_says_nothing_of_clocks(voyage):
 
 
 def test_check_says_what_ingest_says(tmp_path):
-    from shiplog.logs.read import read
+    from shiplog.logs.reading.read import read
 
     profile = sailing.profile()
     path = sailing.write(tmp_path / "turn.mcap", moved(3600.0, GNSS))

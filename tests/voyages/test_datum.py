@@ -5,7 +5,7 @@ import pytest
 import sailing
 from test_ingest_geodetic import geodetic
 
-from shiplog.voyages.ingest import ingest
+from shiplog.voyages.ingest.ingest import ingest
 
 
 def read(tmp_path, latitude, longitude, datum, sign=""):

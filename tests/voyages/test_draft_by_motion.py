@@ -9,12 +9,12 @@ import polars as pl
 import pytest
 from mcap.writer import Writer
 
-from pipelines.convert import convert, draft
-from shiplog import profile_file as profiles
+from shiplog.commands.convert import convert, draft
+from shiplog.drafting import draft as draft_log
+from shiplog.drafting import draft_table
 from shiplog.exceptions import ShiplogError
-from shiplog.voyages.draft_profile import draft as draft_log
-from shiplog.voyages.draft_profile import draft_table
-from shiplog.voyages.ingest import ingest
+from shiplog.ship_profile import file as profiles
+from shiplog.voyages.ingest.ingest import ingest
 
 START_NS = 1_700_000_000_000_000_000
 T = np.arange(0.0, 400.0, 0.5)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from mcap.writer import Writer
 
-from shiplog import profile_file as profiles
+from shiplog.drafting import draft
 from shiplog.exceptions import ChannelMissing
-from shiplog.voyages.draft_profile import draft
-from shiplog.voyages.ingest import ingest
+from shiplog.ship_profile import file as profiles
+from shiplog.voyages.ingest.ingest import ingest
 
 START_S = 1_700_000_000
 TURN = math.radians(3.0)  # rad/s, the bow to starboard

@@ -7,10 +7,10 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipelines.convert import convert
-from shiplog import profile_file as profiles
-from shiplog.voyages.draft_profile import draft_table, facts
-from shiplog.voyages.ingest import ingest
+from shiplog.commands.convert import convert
+from shiplog.drafting import draft_table, facts
+from shiplog.ship_profile import file as profiles
+from shiplog.voyages.ingest.ingest import ingest
 
 COUNT = 240
 STEPS = np.arange(COUNT)

@@ -7,14 +7,14 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipelines.convert import convert
-from shiplog import profile_file as profiles
+from shiplog.commands.convert import convert
+from shiplog.drafting import draft, draft_table
 from shiplog.exceptions import LogUnreadable, ProfileError
-from shiplog.logs.write import Series, write_log
-from shiplog.voyages.draft_profile import draft, draft_table
-from shiplog.voyages.ingest import ingest
-from shiplog.voyages.split import choose_split
-from shiplog.voyages.store import Store
+from shiplog.logs.conversion.write import Series, write_log
+from shiplog.ship_profile import file as profiles
+from shiplog.voyages.ingest.ingest import ingest
+from shiplog.voyages.store.store import Store
+from shiplog.voyages.windows.split import choose_split
 
 SAMPLE = Path(__file__).parents[2] / "sample_logs" / "voyage_1.mcap"
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from shiplog.voyages import empty_course
+from shiplog.voyages.samples import empty_course
 
 NAN = math.nan
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shiplog.voyages import fault_detection
+from shiplog.voyages.rows import fault_detection
 
 RNG = np.random.default_rng(1)
 TIME = np.arange(0, 60, 0.1)

@@ -7,13 +7,13 @@ import polars as pl
 import pytest
 import sailing
 
-from shiplog import frames
-from shiplog.channels import Quality
 from shiplog.exceptions import ChannelMissing, LogUnreadable, ProfileError
-from shiplog.logs.write import Series
-from shiplog.report import tables
-from shiplog.voyages import fault_detection, resampling
-from shiplog.voyages.ingest import ingest
+from shiplog.logs.conversion.write import Series
+from shiplog.nomenclature import frames
+from shiplog.nomenclature.channels import Quality
+from shiplog.report.evaluation import tables
+from shiplog.voyages.ingest.ingest import ingest
+from shiplog.voyages.rows import fault_detection, resampling
 
 
 def changed(parts, topic, **columns):

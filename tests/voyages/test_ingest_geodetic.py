@@ -8,7 +8,7 @@ import sailing
 from test_ingest import kept
 
 from shiplog.exceptions import LogUnreadable
-from shiplog.voyages.ingest import ingest
+from shiplog.voyages.ingest.ingest import ingest
 
 
 @pytest.fixture

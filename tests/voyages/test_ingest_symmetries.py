@@ -13,8 +13,8 @@ import sailing
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shiplog.logs.read import read
-from shiplog.voyages.ingest import build
+from shiplog.logs.reading.read import read
+from shiplog.voyages.ingest.ingest import build
 
 FEW = settings(max_examples=12, deadline=None)
 YEAR = 365 * 86_400 * 10**9  # ns

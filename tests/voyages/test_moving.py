@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 
-from shiplog.voyages import moving
+from shiplog.voyages.rows import moving
 
 COUNTS = (1, 2, 3, 4, 8, 11, 64, 101)
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import sailing
 
-from shiplog.logs.health_report import Instrument
-from shiplog.voyages import noise_estimate
+from shiplog.logs.health.health_report import Instrument
+from shiplog.voyages.rows import noise_estimate
 
 STEP_NS = 100_000_000
 

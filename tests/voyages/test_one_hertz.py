@@ -8,8 +8,8 @@ import polars as pl
 import pytest
 from polars.testing import assert_frame_equal
 
-from shiplog.channels import Quality
-from shiplog.voyages import one_hertz
+from shiplog.nomenclature.channels import Quality
+from shiplog.voyages.rows import one_hertz
 
 START = datetime(2026, 5, 1, 12, 0, 0, tzinfo=UTC)
 

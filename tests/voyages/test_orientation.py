@@ -7,11 +7,11 @@ import pytest
 import sailing
 from scipy.spatial.transform import Rotation
 
-from shiplog import frames
-from shiplog.channels import Quality
 from shiplog.exceptions import LogUnreadable, ProfileError
-from shiplog.logs.write import Series
-from shiplog.voyages.ingest import ingest
+from shiplog.logs.conversion.write import Series
+from shiplog.nomenclature import frames
+from shiplog.nomenclature.channels import Quality
+from shiplog.voyages.ingest.ingest import ingest
 
 GYRO = '[sensors.heading]\ntopic = "/gyro"\nfield = "heading_deg"\nunit = "deg"\nsigma = 0.05'
 ENU, NED = "quaternion_enu", "quaternion_ned"

@@ -9,9 +9,10 @@ import polars as pl
 import pytest
 import sailing
 
-from shiplog import profile_file as profiles
-from shiplog.voyages import comparison, plausible_measures, wind_contradictions
-from shiplog.voyages.plausibility import TABLE, Asked, findings
+from shiplog.ship_profile import file as profiles
+from shiplog.voyages.contradictions import plausible_measures, wind_contradictions
+from shiplog.voyages.contradictions.plausibility import TABLE, Asked, findings
+from shiplog.voyages.sensors import comparison
 
 SHIPPED = ("esso-vectwin", "esso-osaka", "blueboat", "milliampere", "kvlcc2", "kvlcc2-full-scale")
 TANKER = """

@@ -5,7 +5,7 @@ import pytest
 import sailing
 
 from shiplog.exceptions import ProfileError
-from shiplog.voyages.ingest import ingest
+from shiplog.voyages.ingest.ingest import ingest
 
 GEODETIC = sailing.PROFILE.replace(
     'kind = "local"\ntopic = "/position"\nfields = ["x_m", "y_m"]\nunit = "m"',

@@ -9,10 +9,11 @@ import numpy as np
 import polars as pl
 import pytest
 
-from shiplog import frames
-from shiplog import profile_file as profiles
-from shiplog.channels import Quality
-from shiplog.voyages import one_hertz, recording, windows
+from shiplog.nomenclature import frames
+from shiplog.nomenclature.channels import Quality
+from shiplog.ship_profile import file as profiles
+from shiplog.voyages.rows import one_hertz, recording
+from shiplog.voyages.windows import windows
 
 PROFILE = profiles.load("esso-vectwin")
 BODY = profiles.load("esso-osaka")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shiplog.voyages import resampling
+from shiplog.voyages.rows import resampling
 
 S = 1_000_000_000
 

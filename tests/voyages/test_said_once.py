@@ -9,12 +9,12 @@ import pytest
 import sailing
 from test_sound_instruments import Instruments, record, stored
 
-from shiplog.channels import Quality
-from shiplog.logs.health_report import Finding, VoyageReport
-from shiplog.logs.write import write_log
-from shiplog.report import tables
-from shiplog.voyages import sensor_consistency, velocity_filter
-from shiplog.voyages.ingest import ingest
+from shiplog.logs.conversion.write import write_log
+from shiplog.logs.health.health_report import Finding, VoyageReport
+from shiplog.nomenclature.channels import Quality
+from shiplog.report.evaluation import tables
+from shiplog.voyages.ingest.ingest import ingest
+from shiplog.voyages.sensors import sensor_consistency, velocity_filter
 
 ONE_HZ = Instruments(hz=1.0)
 

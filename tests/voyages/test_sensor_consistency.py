@@ -11,10 +11,11 @@ import pytest
 import sailing
 
 from pipelines.experiments.simulated_ship import Effects, Wind, sail, write_voyage
-from shiplog import frames, profile_file
-from shiplog.channels import Quality
-from shiplog.voyages import sensor_consistency
-from shiplog.voyages.ingest import ingest
+from shiplog.nomenclature import frames
+from shiplog.nomenclature.channels import Quality
+from shiplog.ship_profile import file as profile_file
+from shiplog.voyages.ingest.ingest import ingest
+from shiplog.voyages.sensors import sensor_consistency
 
 SAMPLES = Path(__file__).parents[2] / "sample_logs"
 DEGREE = np.pi / 180.0

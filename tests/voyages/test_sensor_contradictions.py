@@ -22,12 +22,12 @@ from known_motion import (
     table,
 )
 
-from shiplog.channels import Quality
-from shiplog.logs.health_report import REASONS, VoyageReport
-from shiplog.voyages import contradictions
-from shiplog.voyages.comparison import compare
-from shiplog.voyages.contradictions_regression import regress
-from shiplog.voyages.contradictions_track import track
+from shiplog.logs.health.health_report import REASONS, VoyageReport
+from shiplog.nomenclature.channels import Quality
+from shiplog.voyages.contradictions import gross as contradictions
+from shiplog.voyages.contradictions.regression import regress
+from shiplog.voyages.contradictions.track import track
+from shiplog.voyages.sensors.comparison import compare
 
 R = math.radians
 SHIP = swinging(turn=7.0)

@@ -11,14 +11,15 @@ from commands import call
 from test_sensor_consistency import BODY, DEGREE, VECTWIN, in_body_axes
 
 from pipelines.experiments.simulated_ship import Effects, Wind, cases, sail, write_voyage
-from shiplog.channels import UNUSABLE, Quality
-from shiplog.logs.health_report import VoyageReport
-from shiplog.voyages import one_hertz, sensor_consistency
-from shiplog.voyages.comparison import compare
-from shiplog.voyages.ingest import Voyage, ingest, usable
-from shiplog.voyages.sensor_correction import corrected, put_right
-from shiplog.voyages.sensor_findings import Estimate
-from shiplog.voyages.store import Store
+from shiplog.logs.health.health_report import VoyageReport
+from shiplog.nomenclature.channels import UNUSABLE, Quality
+from shiplog.voyages.ingest.ingest import Voyage, ingest, usable
+from shiplog.voyages.ingest.sensor_correction import corrected, put_right
+from shiplog.voyages.rows import one_hertz
+from shiplog.voyages.sensors import sensor_consistency
+from shiplog.voyages.sensors.comparison import compare
+from shiplog.voyages.sensors.sensor_findings import Estimate
+from shiplog.voyages.store.store import Store
 
 
 def certain(table):

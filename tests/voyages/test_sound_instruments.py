@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import sailing
 
-from shiplog.channels import Quality
-from shiplog.logs.write import Series
-from shiplog.voyages.ingest import ingest
+from shiplog.logs.conversion.write import Series
+from shiplog.nomenclature.channels import Quality
+from shiplog.voyages.ingest.ingest import ingest
 
 HEAD = """
 [ship]

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 import sailing
 
-from pipelines.train_networks import train_run
+from shiplog.commands.train_networks import train_run
 from shiplog.exceptions import StoreError
-from shiplog.training.run_config import Config
-from shiplog.voyages.ingest import ingest
-from shiplog.voyages.parts import overlap, parse
-from shiplog.voyages.split import choose_physical_split, choose_split
-from shiplog.voyages.split_settings import Split
-from shiplog.voyages.store import Store
+from shiplog.training.settings.run_config import Config
+from shiplog.voyages.ingest.ingest import ingest
+from shiplog.voyages.store.parts import overlap, parse
+from shiplog.voyages.store.store import Store
+from shiplog.voyages.windows.split import choose_physical_split, choose_split
+from shiplog.voyages.windows.split_settings import Split
 
 
 def test_six_voyages_in_order_are_the_papers(tmp_path):

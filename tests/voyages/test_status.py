@@ -10,9 +10,9 @@ import pytest
 import sailing
 from mcap.writer import Writer
 
-from shiplog.channels import Quality
 from shiplog.exceptions import LogUnreadable
-from shiplog.voyages.ingest import ingest
+from shiplog.nomenclature.channels import Quality
+from shiplog.voyages.ingest.ingest import ingest
 
 COUNT = 600
 LOST = slice(200, 220)  # 2 s of 60

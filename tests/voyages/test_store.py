@@ -14,10 +14,10 @@ import sailing
 from filelock import FileLock
 
 from shiplog.exceptions import StoreError
-from shiplog.voyages import catalogue
-from shiplog.voyages import store as stores
-from shiplog.voyages.ingest import ingest
-from shiplog.voyages.store import Store, fingerprint_of
+from shiplog.voyages.ingest.ingest import ingest
+from shiplog.voyages.store import catalogue
+from shiplog.voyages.store import store as stores
+from shiplog.voyages.store.store import Store, fingerprint_of
 
 
 @pytest.fixture

@@ -6,10 +6,11 @@ import closed
 import numpy as np
 import pytest
 
-from shiplog import profile_file as profiles
-from shiplog.diagnosis import segments, trial_voyages
-from shiplog.voyages import timescale
-from shiplog.voyages.timescale import NODE_ROWS, Timescale
+from shiplog.diagnosis.linear import segments
+from shiplog.diagnosis.trial import trial_voyages
+from shiplog.ship_profile import file as profiles
+from shiplog.voyages.rows import timescale
+from shiplog.voyages.rows.timescale import NODE_ROWS, Timescale
 
 RECORD = closed.record(profiles.load("esso-osaka"))  # 120 s
 

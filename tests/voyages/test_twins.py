@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from known_motion import actuator, measured, profile, steered, swinging, table
 
-from shiplog.voyages import contradictions, twins
+from shiplog.voyages.contradictions import gross as contradictions
+from shiplog.voyages.contradictions import twins
 
 RUDDERS = (
     actuator("port", "rudder", -5.0, -1.0, unit="rad"),

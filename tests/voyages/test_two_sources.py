@@ -10,10 +10,10 @@ import pytest
 import sailing
 from mcap.writer import Writer
 
-from pipelines.prepare import check_logs
+from shiplog.commands.prepare import check_logs
 from shiplog.exceptions import ChannelMissing
-from shiplog.logs.senders import senders
-from shiplog.voyages.ingest import ingest
+from shiplog.logs.reading.senders import senders
+from shiplog.voyages.ingest.ingest import ingest
 
 COUNT, STEP = 400, 100_000_000
 APART = 12.0  # m between the two antennas, along y0

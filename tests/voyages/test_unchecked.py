@@ -5,12 +5,12 @@ import logging
 import pytest
 import sailing
 
-from shiplog import profile_file
 from shiplog.exceptions import ProfileError
-from shiplog.training.options import TrainOptions
-from shiplog.voyages.ingest import ingest
-from shiplog.voyages.store import Store
-from shiplog.voyages.unchecked import matters, refuse_unchecked
+from shiplog.ship_profile import file as profile_file
+from shiplog.training.settings.options import TrainOptions
+from shiplog.voyages.ingest.ingest import ingest
+from shiplog.voyages.store.store import Store
+from shiplog.voyages.store.unchecked import matters, refuse_unchecked
 
 OPEN = (
     sailing.PROFILE.replace("length_m = 3.0", "length_m = 1.0  # CHECK: the log does not say")

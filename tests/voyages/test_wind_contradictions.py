@@ -7,8 +7,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from shiplog import profile_file as profiles
-from shiplog.voyages.wind_contradictions import compare
+from shiplog.ship_profile import file as profiles
+from shiplog.voyages.contradictions.wind_contradictions import compare
 
 PROFILE = profiles.load("esso-vectwin")
 KNOT = 1852 / 3600

@@ -7,8 +7,8 @@ import polars as pl
 import pytest
 
 from shiplog.exceptions import WindowError
-from shiplog.voyages import windows
-from shiplog.voyages.augmentation import AUGMENTATIONS
+from shiplog.voyages.windows import windows
+from shiplog.voyages.windows.augmentation import AUGMENTATIONS
 
 START = datetime(2026, 5, 1, tzinfo=UTC)
 STATES = ("x0", "surge", "y0", "sway", "heading", "yaw_rate")

@@ -67,8 +67,8 @@ def of_sensors(path: Path, hours: float) -> int:
     """The sample voyage over and over; how many messages."""
     import numpy as np
 
-    from shiplog.logs.read import read
-    from shiplog.logs.write import Series, write_log
+    from shiplog.logs.conversion.write import Series, write_log
+    from shiplog.logs.reading.read import read
 
     found = read(SAMPLE)
     series, count = [], 0

@@ -1,5 +1,5 @@
 """How long XLA takes to compile and to run a ship's derivatives, with and without its emitters
-of fused loops (`shiplog.jit_cache.COMPILER` switches them off).
+of fused loops (`shiplog.machine.jit_cache.COMPILER` switches them off).
 
     python -m pipelines.experiments.benchmarks.compiling [--rounds 3]
 
@@ -22,12 +22,13 @@ from pipelines.experiments.benchmarks.rollouts import (
     processor,
     report,
 )
-from shiplog import jit_cache, profile_file
-from shiplog.diagnosis import linearisation
+from shiplog.diagnosis.linear import linearisation
+from shiplog.machine import jit_cache
 from shiplog.models.mmg.geometry import geometry_of
 from shiplog.models.mmg.model import MMG
 from shiplog.models.mmg.parameters import load, published_file
-from shiplog.training.queue import cores
+from shiplog.ship_profile import file as profile_file
+from shiplog.training.network.queue import cores
 
 SEGMENTS, NODES = 64, 151  # of one call, as a diagnosis makes them
 WITH: dict[str, str | bool] = {"xla_cpu_use_fusion_emitters": True}

@@ -6,7 +6,7 @@ One simulated voyage is written once and ingested under many names; the store is
 copies of it, since ingesting a thousand takes hours. Each step runs in a process of its own, and
 peak memory is reported after the first half of its voyages and at its end: what grows with the
 number of voyages shows there. Averages and windows are made a voyage at a time, as
-`pipelines.cluster.resample` gives them to the machines of a Ray cluster.
+`shiplog.commands.cluster.resample` gives them to the machines of a Ray cluster.
 """
 
 from __future__ import annotations
@@ -26,10 +26,11 @@ from pathlib import Path
 import polars as pl
 
 from pipelines.experiments import simulated_ship
-from pipelines.prepare import ingest_logs
-from shiplog.voyages import one_hertz, windows
-from shiplog.voyages.split import plan
-from shiplog.voyages.store import Store
+from shiplog.commands.prepare import ingest_logs
+from shiplog.voyages.rows import one_hertz
+from shiplog.voyages.store.store import Store
+from shiplog.voyages.windows import windows
+from shiplog.voyages.windows.split import plan
 
 Steps = Iterator[object]  # one for each voyage that is done
 

@@ -18,13 +18,13 @@ import torch
 
 from pipelines.experiments.benchmarks.training_step import CLOSE, SHAPE, UNIT, WORK, problem
 from shiplog.models.feedforward import FeedForward
-from shiplog.training import network_gradient
-from shiplog.training.gpu import find
-from shiplog.training.job import Training
-from shiplog.training.network_gradient import Batch
-from shiplog.training.run_config import Config, Paper
-from shiplog.training.seeds_together import SeedsTogether, advance
-from shiplog.voyages.split_settings import Split
+from shiplog.training.network import network_gradient
+from shiplog.training.network.gpu import find
+from shiplog.training.network.job import Training
+from shiplog.training.network.network_gradient import Batch
+from shiplog.training.network.seeds_together import SeedsTogether, advance
+from shiplog.training.settings.run_config import Config, Paper
+from shiplog.voyages.windows.split_settings import Split
 
 VALIDATION = 12  # windows of the voyage of the sample logs that validates
 FORWARD = 1.0 / 3.0  # of the work of a window, where no gradient is needed

@@ -24,7 +24,7 @@ PROGRAM = """
 import sys
 from pathlib import Path
 from shiplog import profile_file
-from shiplog.voyages.ingest import ingest
+from shiplog.voyages.ingest.ingest import ingest
 voyage = ingest(Path(sys.argv[1]), profile_file.load("esso-vectwin"))
 print(voyage.report.messages_read)
 """

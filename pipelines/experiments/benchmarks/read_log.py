@@ -102,8 +102,8 @@ def _varint(value: int) -> bytes:
 
 
 def by_shiplog(path: Path) -> Iterator[int]:
-    """Rows of each table, through `shiplog.logs.read`."""
-    from shiplog.logs.read import read
+    """Rows of each table, through `shiplog.logs.reading.read`."""
+    from shiplog.logs.reading.read import read
 
     wanted = {topic: names for topic, (_, names) in TOPICS.items()}
     for frame in read(path, wanted).frames.values():
@@ -112,7 +112,7 @@ def by_shiplog(path: Path) -> Iterator[int]:
 
 def by_shiplog_everything(path: Path) -> Iterator[int]:
     """The same without saying which fields are wanted."""
-    from shiplog.logs.read import read
+    from shiplog.logs.reading.read import read
 
     for frame in read(path).frames.values():
         yield frame.height
@@ -158,8 +158,8 @@ def _one_route(route: str, path: Path) -> None:
 
     import polars  # noqa: F401 - import times are not the reading's
 
-    import shiplog.logs.read  # noqa: F401
-    from shiplog.logs import rerun_route
+    import shiplog.logs.reading.read  # noqa: F401
+    from shiplog.logs.reading import rerun_route
 
     seconds: list[float] = []
     rows = 0

@@ -24,11 +24,12 @@ import numpy as np
 import torch
 
 from pipelines.experiments.benchmarks.machine import processor
-from pipelines.train_networks import training_of
-from shiplog.training import load_model, network_gradient
-from shiplog.training.load_model import NetworkRun
-from shiplog.training.queue import cores
-from shiplog.training.run_folder import open_finished
+from shiplog.training.network import network_gradient
+from shiplog.training.network.queue import cores
+from shiplog.training.runs import load_model
+from shiplog.training.runs.load_model import NetworkRun
+from shiplog.training.runs.network_seeds import training_of
+from shiplog.training.runs.run_folder import open_finished
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from shiplog.voyages import one_hertz
+from shiplog.voyages.rows import one_hertz
 
 COLUMNS = ("heading", "wind_angle", "surge", "sway", "yaw_rate", "propeller")
 CIRCULAR = ("heading", "wind_angle")
@@ -71,7 +71,7 @@ def peer(paths: list[Path], out: Path) -> None:
 
 def on_ray(paths: list[Path], out: Path, address: str) -> None:
     """A task a voyage; the seconds hold the time to join the cluster."""
-    from pipelines import cluster
+    from shiplog.commands import cluster
 
     cluster.resample(paths, COLUMNS, CIRCULAR, out, address)
 

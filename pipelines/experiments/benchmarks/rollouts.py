@@ -20,14 +20,14 @@ import jax
 import numpy as np
 
 from pipelines.experiments.benchmarks.machine import processor
-from shiplog import profile_file
-from shiplog.channels import VELOCITY_IN_STATE
 from shiplog.models.mmg.geometry import geometry_of
 from shiplog.models.mmg.model import MMG
 from shiplog.models.mmg.parameters import Parameters, load, published_file
+from shiplog.nomenclature.channels import VELOCITY_IN_STATE
+from shiplog.ship_profile import file as profile_file
 from shiplog.simulation.sensitivities import WindowSeries, linearised, normal, padded, rollout
-from shiplog.training.output_error import Identified, identify
-from shiplog.training.queue import cores
+from shiplog.training.network.queue import cores
+from shiplog.training.physics.output_error import Identified, identify
 
 try:
     from pipelines.experiments.benchmarks.casadi_mmg import Peer

@@ -30,9 +30,9 @@ import torch  # noqa: E402
 from pipelines.experiments.benchmarks.machine import processor  # noqa: E402
 from shiplog.models.feedforward import Scaling  # noqa: E402
 from shiplog.models.network_shape import Shape  # noqa: E402
-from shiplog.training import kernel, network_gradient  # noqa: E402
-from shiplog.training.network_gradient import Batch  # noqa: E402
-from shiplog.training.queue import cores  # noqa: E402
+from shiplog.training.network import kernel, network_gradient  # noqa: E402
+from shiplog.training.network.network_gradient import Batch  # noqa: E402
+from shiplog.training.network.queue import cores  # noqa: E402
 
 SAMPLES = 100  # of a window
 SHAPE = Shape(3)

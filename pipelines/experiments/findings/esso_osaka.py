@@ -7,14 +7,14 @@ from pathlib import Path
 from pipelines.experiments.esso_osaka import TWIN, trials_store
 from pipelines.experiments.extrapolation import physics
 from pipelines.experiments.findings.reported import diagnosed, variant
-from pipelines.identify import identify_run
-from pipelines.prepare import expand, ingest_logs
-from shiplog.report import tables
-from shiplog.training.run_config import Config
-from shiplog.voyages import sensor_consistency
-from shiplog.voyages.sensor_consistency import Estimate
-from shiplog.voyages.split_settings import Split
-from shiplog.voyages.store import Store
+from shiplog.commands.identify import identify_run
+from shiplog.commands.prepare import expand, ingest_logs
+from shiplog.report.evaluation import tables
+from shiplog.training.settings.run_config import Config
+from shiplog.voyages.sensors import sensor_consistency
+from shiplog.voyages.sensors.sensor_consistency import Estimate
+from shiplog.voyages.store.store import Store
+from shiplog.voyages.windows.split_settings import Split
 
 MANOEUVRES = ("berthing", "random", "turn", "zigzag")
 COLUMNS = {  # kind and channel of an estimate → its column

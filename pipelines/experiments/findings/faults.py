@@ -15,16 +15,16 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from pipelines.diagnose import diagnose_run
 from pipelines.experiments.esso_osaka import trials_store
 from pipelines.experiments.extrapolation import physics
 from pipelines.experiments.findings.reported import parameters, unit
-from pipelines.prepare import expand, ingest_logs
-from shiplog.profile import Profile
-from shiplog.report import tables
-from shiplog.voyages.ingest import ingest
-from shiplog.voyages.split_settings import Split
-from shiplog.voyages.store import Store
+from shiplog.commands.diagnose import diagnose_run
+from shiplog.commands.prepare import expand, ingest_logs
+from shiplog.report.evaluation import tables
+from shiplog.ship_profile.profile import Profile
+from shiplog.voyages.ingest.ingest import ingest
+from shiplog.voyages.store.store import Store
+from shiplog.voyages.windows.split_settings import Split
 
 Columns = dict[str, np.ndarray]  # of a voyage's table, as they are to become
 

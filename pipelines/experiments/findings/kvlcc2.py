@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from pipelines.convert import convert
-from pipelines.evaluate import evaluate_runs
 from pipelines.experiments.findings.reported import diagnosed
-from pipelines.identify import identify_run
-from pipelines.prepare import expand, ingest_logs
-from shiplog import profile_file as profiles
-from shiplog.training.run_config import Config
-from shiplog.voyages.split_settings import Split
-from shiplog.voyages.store import Store
+from shiplog.commands.convert import convert
+from shiplog.commands.evaluate import evaluate_runs
+from shiplog.commands.identify import identify_run
+from shiplog.commands.prepare import expand, ingest_logs
+from shiplog.ship_profile import file as profiles
+from shiplog.training.settings.run_config import Config
+from shiplog.voyages.store.store import Store
+from shiplog.voyages.windows.split_settings import Split
 
 HSVA, MARIN = "hsva_cpmc_zigzag_20hz_model.parquet", "marin_free_fullscale.parquet"
 SCALE = 45.7

@@ -9,15 +9,15 @@ import numpy as np
 import polars as pl
 from scipy.signal import lfilter
 
-from pipelines.convert import convert
 from pipelines.experiments.extrapolation import physics
 from pipelines.experiments.findings.reported import diagnosed, variant
-from pipelines.prepare import ingest_logs
-from shiplog import frames
-from shiplog import profile_file as profiles
-from shiplog.report import tables
-from shiplog.voyages.split_settings import Split
-from shiplog.voyages.store import Store
+from shiplog.commands.convert import convert
+from shiplog.commands.prepare import ingest_logs
+from shiplog.nomenclature import frames
+from shiplog.report.evaluation import tables
+from shiplog.ship_profile import file as profiles
+from shiplog.voyages.store.store import Store
+from shiplog.voyages.windows.split_settings import Split
 
 UNITS = (1, 2, 3, 4)
 FILES = ("actuator_ref_{}.parquet", "actuators__actuator_{}__azimuth_angle.parquet")

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import tomli_w
 
-from pipelines.diagnose import diagnose_run
-from shiplog.voyages.store import Store
+from shiplog.commands.diagnose import diagnose_run
+from shiplog.voyages.store.store import Store
 
 log = logging.getLogger(__name__)
 

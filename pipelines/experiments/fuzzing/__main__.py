@@ -24,8 +24,8 @@ LONGEST_S = 20  # of one input: more is a hang
 
 
 def logs(data: bytes) -> None:
-    from shiplog.logs.check import check
-    from shiplog.logs.read import contents, fields
+    from shiplog.logs.reading.check import check
+    from shiplog.logs.reading.read import contents, fields
 
     with tempfile.NamedTemporaryFile(suffix=".mcap") as file:
         file.write(data)
@@ -35,7 +35,7 @@ def logs(data: bytes) -> None:
 
 
 def profile(data: bytes) -> None:
-    from shiplog import profile_file
+    from shiplog.ship_profile import file as profile_file
 
     with tempfile.NamedTemporaryFile(suffix=".toml") as file:
         file.write(data)
@@ -44,7 +44,7 @@ def profile(data: bytes) -> None:
 
 
 def config(data: bytes) -> None:
-    from shiplog.training import run_config
+    from shiplog.training.settings import run_config
 
     with tempfile.NamedTemporaryFile(suffix=".toml") as file:
         file.write(data)
@@ -77,9 +77,9 @@ def main() -> None:
         return
     atheris: Any = importlib.import_module("atheris")  # no dependency: the nightly script has it
     with atheris.instrument_imports(include=["shiplog"]):
-        import shiplog.logs.check
-        import shiplog.profile_file
-        import shiplog.training.run_config  # noqa: F401  # imported to be instrumented
+        import shiplog.logs.reading.check
+        import shiplog.ship_profile.file
+        import shiplog.training.settings.run_config  # noqa: F401  # imported to be instrumented
     corpus = asked.corpus or Path(tempfile.mkdtemp(prefix="shiplog-corpus-"))
     corpus.mkdir(parents=True, exist_ok=True)
     options = [

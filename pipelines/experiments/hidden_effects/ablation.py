@@ -13,8 +13,8 @@ from pipelines.experiments.hidden_effects.score import Answer
 from pipelines.experiments.hidden_effects.two_programs import Pair
 from pipelines.experiments.hidden_effects.validation import heading, one_program
 from shiplog.exceptions import ShiplogError
-from shiplog.numbers import counted
-from shiplog.report import tables
+from shiplog.nomenclature.numbers import counted
+from shiplog.report.evaluation import tables
 
 WHOLE = "nothing"  # taken out: the decision as it is
 TITLE = "# The decision without one of its parts"

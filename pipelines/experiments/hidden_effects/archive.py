@@ -16,8 +16,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from pipelines.experiments.hidden_effects.score import made
-from shiplog import files
 from shiplog.exceptions import ShiplogError
+from shiplog.machine import files
 
 KEPT = ("verdict.json", "verdict.sha256", "rivals.json", "rivals.sha256", "oracle.json",
         "steps.json")  # fmt: skip

@@ -15,7 +15,7 @@ from pipelines.experiments.hidden_effects.score import (
     calibration,
     clopper_pearson,
 )
-from shiplog.report import tables
+from shiplog.report.evaluation import tables
 
 Test = Callable[[Answer], bool]
 Limits = tuple[float | None, float | None]  # at least, at most

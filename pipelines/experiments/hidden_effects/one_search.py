@@ -17,9 +17,11 @@ from unittest.mock import patch
 from pipelines.experiments.hidden_effects import plan as plans
 from pipelines.experiments.hidden_effects import run
 from shiplog.cli import process
-from shiplog.diagnosis import decide, posterior, refutation, setup, thresholds, trial_decision
-from shiplog.diagnosis.remainder import NOMINAL
-from shiplog.diagnosis.search import Search
+from shiplog.diagnosis import thresholds
+from shiplog.diagnosis.hypotheses.search import Search
+from shiplog.diagnosis.noise.remainder import NOMINAL
+from shiplog.diagnosis.trial import setup
+from shiplog.diagnosis.verdict import decide, posterior, refutation, trial_decision
 
 WITHOUT = "verdict-without-{}.json"
 Part = Callable[[ExitStack], None]

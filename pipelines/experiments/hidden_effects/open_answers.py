@@ -3,7 +3,7 @@
 The verdict's `ranking` has a probability for every cause by itself, and causes that act in every
 answer stand in it first. Which of them make one answer is in its `sentence` alone: "Undecided: side
 thrust (50%), or something outside the catalogue (intermittent) (50%)". So that is read here, and a
-test reads what `shiplog.report.verdict_sentence` writes.
+test reads what `shiplog.report.diagnosis.verdict_sentence` writes.
 """
 
 from __future__ import annotations

@@ -22,12 +22,12 @@ from scipy.optimize import least_squares
 
 from pipelines.experiments.hidden_effects.parameters import OTHER_FORM
 from pipelines.experiments.hidden_effects.score import open_key
-from shiplog.diagnosis.held_out import Rollouts
-from shiplog.diagnosis.trial_voyages import record_of, setting_of, windows_of
+from shiplog.diagnosis.trial.trial_voyages import record_of, setting_of, windows_of
+from shiplog.diagnosis.verdict.held_out import Rollouts
 from shiplog.exceptions import ShiplogError
 from shiplog.models.causes import CATALOGUE, Cause, Setting, constants_of
-from shiplog.training import load_model
-from shiplog.voyages.store import Store
+from shiplog.training.runs import load_model
+from shiplog.voyages.store.store import Store
 
 Truth = Mapping[str, Any]  # a cause of a key: name, and parameters as the contract has them
 

@@ -17,7 +17,7 @@ from scipy.special import chdtrc, ndtr, ndtri
 from pipelines.experiments.hidden_effects.goals import cell, percent
 from pipelines.experiments.hidden_effects.parameters import OTHER_FORM
 from pipelines.experiments.hidden_effects.score import Answer
-from shiplog.report import tables
+from shiplog.report.evaluation import tables
 
 RANKS = 10
 LEVELS = (0.5, 0.8, 0.9, 0.95)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from pipelines.experiments.hidden_effects.goals import cell
 from pipelines.experiments.hidden_effects.score import BINS, Statement, bin_of, clopper_pearson
-from shiplog.report import tables
+from shiplog.report.evaluation import tables
 
 SIDE, MARGIN, GAP = 240, 50, 40  # px of a panel, around it, and between two
 

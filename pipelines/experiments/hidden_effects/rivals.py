@@ -27,21 +27,23 @@ import jax
 import numpy as np
 from scipy.special import chdtri  # scipy.stats takes a second to load
 
-from shiplog.diagnosis import evidence, likelihood, measurement_correction, segments
-from shiplog.diagnosis.fitted import Point
-from shiplog.diagnosis.likelihood import ProcessNoise
-from shiplog.diagnosis.linear_segments import Linear
-from shiplog.diagnosis.parameter_layout import Columns
-from shiplog.diagnosis.segments import Cut
-from shiplog.diagnosis.setup import trial_of
+from shiplog.diagnosis.hypotheses import evidence
+from shiplog.diagnosis.linear import measurement_correction, segments
+from shiplog.diagnosis.linear.linear_segments import Linear
+from shiplog.diagnosis.linear.parameter_layout import Columns
+from shiplog.diagnosis.linear.segments import Cut
+from shiplog.diagnosis.noise import likelihood
+from shiplog.diagnosis.noise.likelihood import ProcessNoise
 from shiplog.diagnosis.thresholds import SHOWS_NATS
-from shiplog.diagnosis.trial import Trial
+from shiplog.diagnosis.trial.fitted import Point
+from shiplog.diagnosis.trial.setup import trial_of
+from shiplog.diagnosis.trial.trial import Trial
 from shiplog.exceptions import RunError, ShiplogError
-from shiplog.training import load_model
-from shiplog.voyages import recording
-from shiplog.voyages.recording import Record
-from shiplog.voyages.store import Store
-from shiplog.voyages.timescale import BIN
+from shiplog.training.runs import load_model
+from shiplog.voyages.rows import recording
+from shiplog.voyages.rows.recording import Record
+from shiplog.voyages.rows.timescale import BIN
+from shiplog.voyages.store.store import Store
 
 VELOCITY = [1, 3, 5]  # of channels.STATE
 SURE = 0.999  # that nothing is named where nothing is hidden, if the noise were white

@@ -27,7 +27,7 @@ from pipelines.experiments.hidden_effects import program
 from pipelines.experiments.hidden_effects.plan import Plan, Planned
 from pipelines.experiments.hidden_effects.program import ROOT
 from pipelines.experiments.hidden_effects.score import FAILED, attempt
-from shiplog import files
+from shiplog.machine import files
 
 log = logging.getLogger(__name__)
 

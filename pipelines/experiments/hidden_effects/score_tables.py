@@ -40,7 +40,7 @@ from pipelines.experiments.hidden_effects.score import (
     calibration,
     clopper_pearson,
 )
-from shiplog.report import tables
+from shiplog.report.evaluation import tables
 
 LENGTHS = 170.0  # as in `other_families.cases`, which needs a simulator to be imported
 Row = tuple[str, str, str, str, str, str]  # what, measured, of, 90 % interval, goal, met

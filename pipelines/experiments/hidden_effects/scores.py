@@ -15,7 +15,7 @@ from collections.abc import Collection, Mapping, Sequence
 from pipelines.experiments.hidden_effects.goals import alarmed, cell
 from pipelines.experiments.hidden_effects.parameters import NAMES
 from pipelines.experiments.hidden_effects.score import FAILED, Answer
-from shiplog.report import tables
+from shiplog.report.evaluation import tables
 
 OUTSIDE = "outside the catalogue"  # a component of its own, next to the names
 COMPONENTS = len(NAMES) + 1

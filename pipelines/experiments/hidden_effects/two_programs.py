@@ -14,8 +14,8 @@ from pipelines.experiments.hidden_effects import goals, score_tables
 from pipelines.experiments.hidden_effects.score import Answer, Score
 from pipelines.experiments.hidden_effects.validation import PLACES, heading, one_program
 from shiplog.exceptions import ShiplogError
-from shiplog.numbers import counted
-from shiplog.report import tables
+from shiplog.nomenclature.numbers import counted
+from shiplog.report.evaluation import tables
 
 FORMER, PRESENT = "former", "present"
 TITLE = "# Former and present decision on the same cases"

@@ -23,8 +23,8 @@ from pipelines.experiments.hidden_effects import (
 from pipelines.experiments.hidden_effects.score import FAILED, LEVEL, Answer, Score, attempt
 from shiplog.diagnosis.thresholds import STATED
 from shiplog.exceptions import ShiplogError, listed
-from shiplog.numbers import counted
-from shiplog.report import tables
+from shiplog.nomenclature.numbers import counted
+from shiplog.report.evaluation import tables
 
 SHIPMMG = "shipmmg"  # a type of ship of another package, and an MMG too
 PLACES = (goals.SAME, goals.OTHER)

@@ -30,24 +30,22 @@ from pipelines.experiments.hidden_effects.one_search import Part
 from pipelines.experiments.hidden_effects.plan import positive
 from pipelines.experiments.hidden_effects.program import ROOT, identity, name
 from pipelines.experiments.hidden_effects.run import Settings
-from shiplog import cli, files
-from shiplog.diagnosis import (
-    baseline_check,
+from shiplog import cli
+from shiplog.diagnosis import thresholds
+from shiplog.diagnosis.hypotheses import evidence, fits
+from shiplog.diagnosis.hypotheses.table import Hypotheses
+from shiplog.diagnosis.noise import discrepancy
+from shiplog.diagnosis.noise.remainder import INTERMITTENT
+from shiplog.diagnosis.nominal import (
     campaign_characteristics,
-    discrepancy,
-    evidence,
-    fits,
     nominal_cache,
     nominal_fit,
     placebo,
-    posterior,
-    refutation,
-    thresholds,
-    trial_voyages,
     voyage_effects,
 )
-from shiplog.diagnosis.hypotheses import Hypotheses
-from shiplog.diagnosis.remainder import INTERMITTENT
+from shiplog.diagnosis.trial import trial_voyages
+from shiplog.diagnosis.verdict import baseline_check, posterior, refutation
+from shiplog.machine import files
 from shiplog.models.causes import CATALOGUE
 
 

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from pipelines.experiments.measured_ships.judgements import JUDGEMENTS
 from pipelines.experiments.measured_ships.ships import DATA_SETS
 from pipelines.experiments.measured_ships.way import Way
-from shiplog.report import tables
-from shiplog.voyages.one_hertz import WINDOW
+from shiplog.report.evaluation import tables
+from shiplog.voyages.rows.one_hertz import WINDOW
 
 WIDTH = 100  # letters of a line
 HEAD = """# Measured ships, from their files to a verdict

@@ -17,7 +17,7 @@ import numpy as np
 from pipelines.experiments.other_families.disturbance import sines
 from pipelines.experiments.other_families.ship import Actuator
 from pipelines.experiments.other_families.voyage import Voyage
-from shiplog.logs.write import Series, write_log
+from shiplog.logs.conversion.write import Series, write_log
 
 DATUM = (63.44, 10.40)  # deg, near the harbour of Trondheim
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)

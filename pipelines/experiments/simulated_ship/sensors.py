@@ -17,7 +17,7 @@ import numpy as np
 from pipelines.experiments.simulated_ship.ship import ANTENNA
 from pipelines.experiments.simulated_ship.voyage import Voyage
 from pipelines.experiments.simulated_ship.weather import ornstein_uhlenbeck
-from shiplog.logs.write import Series, write_log
+from shiplog.logs.conversion.write import Series, write_log
 
 ORIGIN = "pipelines.known_ship"  # this simulator, as the committed logs name it
 DATUM = (34.82, 135.52)  # deg, near Inukai Pond, Osaka University

@@ -12,15 +12,15 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from pipelines.convert import convert
 from pipelines.experiments.stored_values import instruments, motion, recorders
 from pipelines.experiments.stored_values.changes import CHANGES, Change
 from pipelines.experiments.stored_values.instruments import Instruments, Recorded
 from pipelines.experiments.stored_values.motion import Motion
 from pipelines.experiments.stored_values.recorders import Recorder
-from shiplog import profile_file
+from shiplog.commands.convert import convert
 from shiplog.exceptions import ShiplogError
-from shiplog.voyages.ingest import ingest
+from shiplog.ship_profile import file as profile_file
+from shiplog.voyages.ingest.ingest import ingest
 
 UNUSABLE = 1 | 2 | 4 | 8 | 32  # the contract's marks: gap, blank, limits, spike, frozen
 WRONG_SHARE = 0.01  # of the usable rows: more than so many beyond the tolerance are wrong values

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from scipy.stats import beta
 
 from pipelines.experiments.stored_values.judge import Outcome
-from shiplog.report import tables
+from shiplog.report.evaluation import tables
 
 
 def share(hits: int, of: int) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 from pipelines.experiments.wrong_profiles.diagnosed import Diagnosed
 from pipelines.experiments.wrong_profiles.profiles import Wrong
 from pipelines.experiments.wrong_profiles.seen import NAMED, WAYS, Seen, of_way
-from shiplog.report.text_table import table
+from shiplog.report.evaluation.text_table import table
 
 HEAD = """# Profiles with one thing wrong
 

@@ -9,11 +9,11 @@ from functools import lru_cache
 from pathlib import Path
 
 from pipelines.experiments.wrong_profiles.profiles import Wrong, text_of
-from shiplog import profile_file
 from shiplog.exceptions import ShiplogError
-from shiplog.logs.health_report import Finding, NotCompared
-from shiplog.profile import Profile
-from shiplog.voyages.ingest import ingest
+from shiplog.logs.health.health_report import Finding, NotCompared
+from shiplog.ship_profile import file as profile_file
+from shiplog.ship_profile.profile import Profile
+from shiplog.voyages.ingest.ingest import ingest
 
 LOGS = Path(__file__).parents[3] / "sample_logs"
 TRIAL = ("season3_1", "season3_2")  # nothing is hidden in it

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shiplog.units import SECOND_NS
+from shiplog.nomenclature.units import SECOND_NS
 
 AROUND = 100  # steps over which a period is averaged: more than a burst has, and than pauses are
 TOGETHER = 0.25  # of the mean period: stamps that are nearer to each other are of one burst,

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import polars as pl
 
-from shiplog import units
 from shiplog.exceptions import ProfileError
 from shiplog.logs.conversion import clock
-from shiplog.profile import Column
+from shiplog.nomenclature import units
+from shiplog.ship_profile.profile import Column
 
 log = logging.getLogger(__name__)
 

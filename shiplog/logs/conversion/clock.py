@@ -8,11 +8,11 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 import polars as pl
 
-from shiplog import units
 from shiplog.exceptions import ProfileError
-from shiplog.logs import fields
 from shiplog.logs.conversion import written_times
-from shiplog.units import SECOND_NS
+from shiplog.logs.decoding import fields
+from shiplog.nomenclature import units
+from shiplog.nomenclature.units import SECOND_NS
 
 DAY_NS = 86_400 * SECOND_NS
 LATEST_NS = 3600 * SECOND_NS  # no row comes later than that

@@ -16,12 +16,12 @@ from shiplog.exceptions import ChannelMissing, ProfileError, listed, nearest
 from shiplog.logs.conversion import cells, clock
 from shiplog.logs.conversion.delimited import DelimitedTable
 from shiplog.logs.conversion.steps_back import along
-from shiplog.logs.dates import UNDATED
-from shiplog.logs.health_report import Finding
-from shiplog.logs.write import SCHEMAS, Series
-from shiplog.numbers import counted
-from shiplog.profile import Column, Profile, Source
-from shiplog.profile_channels import TABLE_CHANNELS, TABLE_LABELS, channels_of
+from shiplog.logs.conversion.write import SCHEMAS, Series
+from shiplog.logs.health.dates import UNDATED
+from shiplog.logs.health.health_report import Finding
+from shiplog.nomenclature.numbers import counted
+from shiplog.ship_profile.profile import Column, Profile, Source
+from shiplog.ship_profile.table_channels import TABLE_CHANNELS, TABLE_LABELS, channels_of
 
 log = logging.getLogger(__name__)
 

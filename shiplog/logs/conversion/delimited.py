@@ -16,8 +16,8 @@ import polars as pl
 from shiplog.exceptions import ChannelMissing
 from shiplog.logs.conversion.sound_rows import sound_rows
 from shiplog.logs.conversion.written_numbers import is_number, read_columns
-from shiplog.logs.foreign_files import is_binary
-from shiplog.profile import Column
+from shiplog.logs.mcap_file.foreign_files import is_binary
+from shiplog.ship_profile.profile import Column
 
 log = logging.getLogger(__name__)
 

@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 from pygeomag import GeoMag
 
-from shiplog.units import SECOND_NS
+from shiplog.nomenclature.units import SECOND_NS
 
 FIRST_YEAR, LAST_YEAR = 2010.0, 2030.0  # of the coefficients
 BEYOND = 5.0  # years before and after them: the field drifts by up to 0.2 deg/yr from the model

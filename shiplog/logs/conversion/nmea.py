@@ -33,9 +33,9 @@ from shiplog.logs.conversion.nmea_lines import (
 from shiplog.logs.conversion.nmea_sentences import SENTENCES, TIME_AT
 from shiplog.logs.conversion.nmea_topics import Gathered, Rows, Spoken, topics_of
 from shiplog.logs.conversion.nmea_utc import Resolved, Times, kept, resolve
-from shiplog.logs.health_report import Finding
-from shiplog.logs.write import Series
-from shiplog.units import SECOND_NS
+from shiplog.logs.conversion.write import Series
+from shiplog.logs.health.health_report import Finding
+from shiplog.nomenclature.units import SECOND_NS
 
 log = logging.getLogger(__name__)
 

@@ -18,8 +18,8 @@ import numpy as np
 
 from shiplog.logs.conversion.clock import DAY_NS
 from shiplog.logs.conversion.nmea_utc import ROLLOVER_DAYS, Resolved
-from shiplog.logs.faults import LATEST_S
-from shiplog.units import SECOND_NS, YEAR_2000_NS
+from shiplog.logs.health.faults import LATEST_S
+from shiplog.nomenclature.units import SECOND_NS, YEAR_2000_NS
 
 LATENCY_NS = int(LATEST_S * SECOND_NS)  # the most that is taken for a receiver's
 SMALL_NS = SECOND_NS // 2  # most receivers are faster

@@ -18,9 +18,9 @@ from shiplog.logs.conversion.nmea import NmeaLog, is_nmea, read_nmea_log
 from shiplog.logs.conversion.nmea_lines import SENTENCE, Stamps
 from shiplog.logs.conversion.nmea_receivers import fills
 from shiplog.logs.conversion.topics import folder_to_series
-from shiplog.logs.health_report import Finding
-from shiplog.logs.write import Series
-from shiplog.profile import Column, Profile
+from shiplog.logs.conversion.write import Series
+from shiplog.logs.health.health_report import Finding
+from shiplog.ship_profile.profile import Column, Profile
 
 LOOKED_AT = 50  # lines of a text, that say whether it has stamps
 HEADERS = ("sentence", "nmea")  # a table's column of sentences has stamps of its own

@@ -15,7 +15,7 @@ from functools import reduce
 from operator import xor
 
 from shiplog.logs.conversion.clock import DAY_NS
-from shiplog.units import SECOND_NS, UNIX_NS, unix_unit
+from shiplog.nomenclature.units import SECOND_NS, UNIX_NS, unix_unit
 
 SENTENCE = re.compile(
     r"[$!]([A-Z0-9]{2})([A-Z]{3}),([^$!\r\n*\\]*)(?:\*([0-9A-Fa-f]{1,2}))?"

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shiplog.units import SECOND_NS
+from shiplog.nomenclature.units import SECOND_NS
 
 METRES_A_DEGREE = 111_320.0
 APART_M = 2.0  # antennas that are nearer are one in what follows

@@ -6,9 +6,9 @@ from shiplog.logs.conversion import magnetic
 from shiplog.logs.conversion.nmea_clock import Clock
 from shiplog.logs.conversion.nmea_topics import Spoken
 from shiplog.logs.conversion.nmea_utc import OtherClock, Resolved
-from shiplog.logs.health_report import Finding
-from shiplog.numbers import counted
-from shiplog.units import SECOND_NS
+from shiplog.logs.health.health_report import Finding
+from shiplog.nomenclature.numbers import counted
+from shiplog.nomenclature.units import SECOND_NS
 
 LATE_NS = SECOND_NS // 2  # clocks that differ by more are reported: at 10 m/s 5 m
 FEW_DROPPED = 0.01  # share of a topic's sentences before the first time: no log begins at a fix

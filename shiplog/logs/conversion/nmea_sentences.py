@@ -10,8 +10,8 @@ import math
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
-from shiplog import units
 from shiplog.logs.conversion import nmea_status as status
+from shiplog.nomenclature import units
 
 BLANK = math.nan
 WHERE = ("latitude", "longitude")

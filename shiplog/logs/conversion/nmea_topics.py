@@ -27,7 +27,7 @@ from shiplog.logs.conversion.nmea_sentences import (
     family,
 )
 from shiplog.logs.conversion.nmea_utc import Resolved
-from shiplog.logs.write import Series
+from shiplog.logs.conversion.write import Series
 
 ENOUGH = 0.5  # times the most frequent sentence of a topic: a better one with as many is taken
 ONE_AN_EPOCH = 1.2  # sentences in an epoch, of which each is of the receiver before it

@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from shiplog.logs.conversion.clock import DAY_NS
-from shiplog.units import SECOND_NS, YEAR_2000_NS
+from shiplog.nomenclature.units import SECOND_NS, YEAR_2000_NS
 
 BACK_NS = 2 * SECOND_NS  # a late sentence of the same clock
 AHEAD_NS = 60 * SECOND_NS  # a longer silence ends a track

@@ -19,8 +19,8 @@ from shiplog.exceptions import ChannelMissing, listed
 from shiplog.logs.conversion.nmea import NmeaLog, read_sentences
 from shiplog.logs.conversion.nmea_lines import Stamps
 from shiplog.logs.conversion.signalk_topics import PREFIXES, Values, topics_of, unread
-from shiplog.logs.health_report import Finding
-from shiplog.logs.write import Series
+from shiplog.logs.conversion.write import Series
+from shiplog.logs.health.health_report import Finding
 
 log = logging.getLogger(__name__)
 

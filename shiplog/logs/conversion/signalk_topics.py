@@ -11,9 +11,9 @@ import numpy as np
 
 from shiplog.logs.conversion import magnetic
 from shiplog.logs.conversion.nmea_report import compass
-from shiplog.logs.health_report import Finding
-from shiplog.logs.write import Series
-from shiplog.units import SECOND_NS
+from shiplog.logs.conversion.write import Series
+from shiplog.logs.health.health_report import Finding
+from shiplog.nomenclature.units import SECOND_NS
 
 DEG = 180.0 / math.pi
 LARGEST = 1e12  # beyond is no value of a ship

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shiplog.numbers import counted
+from shiplog.nomenclature.numbers import counted
 
 CHUNK_BYTES = 1 << 23  # that are looked at together: memory goes with it, and not with the file
 HABIT = 0.2  # share of rows: what so many have in common is the writer's habit, and no damage

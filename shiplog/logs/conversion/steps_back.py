@@ -16,9 +16,9 @@ import numpy as np
 import polars as pl
 
 from shiplog.exceptions import ProfileError
-from shiplog.logs import dates
-from shiplog.logs.health_report import Finding
-from shiplog.units import SECOND_NS
+from shiplog.logs.health import dates
+from shiplog.logs.health.health_report import Finding
+from shiplog.nomenclature.units import SECOND_NS
 
 HOUR_NS, DAY_NS, WEEK_NS = 3600 * SECOND_NS, dates.DAY_NS, 7 * dates.DAY_NS
 # Counters by their bits and the tick that they count. What a restart is as likely to be (a minute,

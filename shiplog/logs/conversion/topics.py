@@ -16,8 +16,8 @@ from shiplog.logs.conversion.columns import named_apart, plain, refuse_scaled, s
 from shiplog.logs.conversion.delimited import is_table, read_table, unlike
 from shiplog.logs.conversion.nmea import lines_to_series
 from shiplog.logs.conversion.steps_back import of_one_recording
-from shiplog.logs.write import THE_MESSAGES_OWN, Series
-from shiplog.profile import Column, Profile
+from shiplog.logs.conversion.write import THE_MESSAGES_OWN, Series
+from shiplog.ship_profile.profile import Column, Profile
 
 log = logging.getLogger(__name__)
 

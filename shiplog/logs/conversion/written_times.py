@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 
 from shiplog.exceptions import ProfileError
-from shiplog.units import SECOND_NS
+from shiplog.nomenclature.units import SECOND_NS
 
 DAY_NS = 86_400 * SECOND_NS
 MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")

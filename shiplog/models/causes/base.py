@@ -14,10 +14,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from shiplog.channels import DEGREE
-from shiplog.numbers import figure
-from shiplog.profile import Profile
-from shiplog.voyages.recording import Record
+from shiplog.nomenclature.channels import DEGREE
+from shiplog.nomenclature.numbers import figure
+from shiplog.ship_profile.profile import Profile
+from shiplog.voyages.rows.recording import Record
 
 # Standard deviation of the logarithm of an uncertain factor in a cause's equations: a factor of
 # 1.6. Published formulas for one force differ by as much.

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from shiplog.models.causes.base import Cause, Parameter, ParameterEstimate
-from shiplog.voyages import instrument_faults as faults
-from shiplog.voyages.recording import Record
+from shiplog.voyages.rows.recording import Record
+from shiplog.voyages.sensors import instrument_faults as faults
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ import numba
 import numpy as np
 
 from shiplog.models.causes.base import Cause, Parameter, ParameterEstimate, Setting
-from shiplog.numbers import figure
-from shiplog.profile import Profile
-from shiplog.voyages.recording import Record
+from shiplog.nomenclature.numbers import figure
+from shiplog.ship_profile.profile import Profile
+from shiplog.voyages.rows.recording import Record
 
 K_T = ("k0", "k1", "k2", "c3", "c6", "c7")  # a screw's thrust is their sum of products
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from shiplog.exceptions import RunError
+from shiplog.machine.paths import check_causes
 from shiplog.models.causes import CATALOGUE, Cause
-from shiplog.paths import check_causes
 
 # What a verdict or its ranking may say in addition to the names of the catalogue.
 ANSWERS = {"side_thrust", "none", "unknown", "undecided", "coverage", "external"}

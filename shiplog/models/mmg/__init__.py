@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from shiplog import jit_cache  # noqa: F401  # for its effect: JAX in double precision
+from shiplog.machine import jit_cache  # noqa: F401  # for its effect: JAX in double precision
 from shiplog.models.coefficients import Parameters
 from shiplog.models.mmg.geometry import PARTS, Geometry, geometry_of
 from shiplog.models.mmg.model import MMG
 from shiplog.models.mmg.parameters import estimated, load, published_file
 from shiplog.models.physical import Beginning, PhysicalModel, Settings
-from shiplog.profile import Profile
+from shiplog.ship_profile.profile import Profile
 
 __all__ = [
     "MMG",

@@ -12,7 +12,7 @@ from math import log10, pi, sqrt
 
 import numpy as np
 
-from shiplog.profile import Actuator, Profile, Ship
+from shiplog.ship_profile.profile import Actuator, Profile, Ship
 
 GRAVITY = 9.80665  # m/s²
 VISCOSITY = 1.1e-6  # m²/s, water of 16 °C

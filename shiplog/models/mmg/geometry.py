@@ -7,11 +7,11 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from shiplog import units
 from shiplog.exceptions import ProfileError, listed, nearest
 from shiplog.models import FORCES
 from shiplog.models.mmg.estimate import Particulars, particulars, rudder_size
-from shiplog.profile import Actuator, Profile
+from shiplog.nomenclature import units
+from shiplog.ship_profile.profile import Actuator, Profile
 
 AIR = 1.225  # kg/m³
 WIDE_ANGLE = math.radians(45.0)

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import jax.numpy as jnp
 from jax import Array
 
-from shiplog.frames import in_body_axes
 from shiplog.models.mmg.geometry import AIR, Geometry
 from shiplog.models.mmg.safe_root import root
+from shiplog.nomenclature.frames import in_body_axes
 
 
 def apparent(true_wind: Array, heading: Array, u: Array, v: Array) -> tuple[Array, Array]:

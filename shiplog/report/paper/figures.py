@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import polars as pl
 
-from shiplog import channels
+from shiplog.nomenclature import channels
 from shiplog.report.paper.style import COLOURS, MEASURED, figure, named
-from shiplog.voyages.wind_histogram import ANGLE_BIN
+from shiplog.voyages.windows.wind_histogram import ANGLE_BIN
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import polars as pl
 
 from shiplog.exceptions import listed
-from shiplog.numbers import counted
-from shiplog.report import tables
-from shiplog.report.evaluation import EvaluatedRuns
+from shiplog.nomenclature.numbers import counted
+from shiplog.report.evaluation import tables
+from shiplog.report.evaluation.evaluation import EvaluatedRuns
 from shiplog.report.paper import statements
 from shiplog.report.paper.style import named
-from shiplog.training.run_folder import RunFolder
+from shiplog.training.runs.run_folder import RunFolder
 
 SHOWN_VOYAGES = 4  # of a set
 

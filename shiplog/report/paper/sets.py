@@ -8,9 +8,9 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 import polars as pl
 
-from shiplog import channels
-from shiplog.voyages.augmentation import AUGMENTATIONS
-from shiplog.voyages.wind_histogram import ANGLE_BIN, FASTEST, SPEED_BIN, wind_counts
+from shiplog.nomenclature import channels
+from shiplog.voyages.windows.augmentation import AUGMENTATIONS
+from shiplog.voyages.windows.wind_histogram import ANGLE_BIN, FASTEST, SPEED_BIN, wind_counts
 
 HISTOGRAM_BINS = 30  # of a histogram of one channel
 

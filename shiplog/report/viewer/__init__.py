@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from shiplog.report.comparison_data import ComparisonData, DrawnActuator
-from shiplog.report.diagnosis_data import Exhibit
+from shiplog.report.viewer.comparison_data import ComparisonData, DrawnActuator
+from shiplog.report.viewer.diagnosis_data import Exhibit
 from shiplog.report.viewer.native import RERUN, Served, open_viewer, serve
 
 __all__ = [

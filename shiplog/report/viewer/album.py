@@ -8,7 +8,7 @@ from pathlib import Path
 import rerun as rr
 import rerun.blueprint as rrb
 
-from shiplog.report.text_table import inert
+from shiplog.report.evaluation.text_table import inert
 from shiplog.report.viewer.recording import whole
 
 

@@ -10,11 +10,11 @@ import polars as pl
 import rerun as rr
 import rerun.blueprint as rrb
 
-from shiplog import channels
-from shiplog.report.comparison_data import ComparisonData
-from shiplog.report.diagnosis_data import AFTER, BEFORE, Exhibit
-from shiplog.report.text_table import inert
+from shiplog.nomenclature import channels
+from shiplog.report.evaluation.text_table import inert
 from shiplog.report.viewer import display, forces, style, timeline, trajectory
+from shiplog.report.viewer.comparison_data import ComparisonData
+from shiplog.report.viewer.diagnosis_data import AFTER, BEFORE, Exhibit
 from shiplog.report.viewer.display import Drawn
 from shiplog.report.viewer.style import entity
 

@@ -9,8 +9,8 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from shiplog import channels
-from shiplog.report.comparison_data import BAND, ComparisonData
+from shiplog.nomenclature import channels
+from shiplog.report.viewer.comparison_data import BAND, ComparisonData
 
 TURN = 2.0 * math.pi
 ROLLOUT = ("model", "seed", "voyage", "window")  # what one rollout is known by

@@ -13,12 +13,12 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from shiplog import channels
-from shiplog.channels import Channel
+from shiplog.nomenclature import channels
+from shiplog.nomenclature.channels import Channel
 from shiplog.report.viewer import display, style
 from shiplog.report.viewer.display import Drawn
 from shiplog.report.viewer.style import entity
-from shiplog.voyages.wind_histogram import ANGLE_BIN, FASTEST, SPEED_BIN, wind_counts
+from shiplog.voyages.windows.wind_histogram import ANGLE_BIN, FASTEST, SPEED_BIN, wind_counts
 
 MOST_BINS = 40
 SETS = ("training", "test")

@@ -9,10 +9,8 @@ from pathlib import Path
 import rerun as rr
 import rerun.blueprint as rrb
 
-from shiplog import files
 from shiplog.exceptions import ShiplogError
-from shiplog.report.comparison_data import ComparisonData
-from shiplog.report.diagnosis_data import Exhibit
+from shiplog.machine import files
 from shiplog.report.viewer import (
     diagnosis,
     display,
@@ -23,6 +21,8 @@ from shiplog.report.viewer import (
     timeline,
     trajectory,
 )
+from shiplog.report.viewer.comparison_data import ComparisonData
+from shiplog.report.viewer.diagnosis_data import Exhibit
 from shiplog.report.viewer.display import Drawn
 
 # A view sends entities and names its place: with the others of a voyage, or, called without

@@ -5,7 +5,7 @@ from __future__ import annotations
 import rerun as rr
 import rerun.blueprint as rrb
 
-from shiplog.report.text_table import inert
+from shiplog.report.evaluation.text_table import inert
 from shiplog.report.viewer import display, forces
 from shiplog.report.viewer.display import Drawn
 

@@ -10,9 +10,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from shiplog import channels
-from shiplog.report.comparison_data import BAND
+from shiplog.nomenclature import channels
 from shiplog.report.viewer import display, style
+from shiplog.report.viewer.comparison_data import BAND
 from shiplog.report.viewer.display import Drawn
 from shiplog.report.viewer.style import entity
 

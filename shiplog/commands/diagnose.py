@@ -1,0 +1,277 @@
+"""A model and voyages to a verdict: what is wrong, why, the extended model, the gain."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from shiplog.commands.bars import reach, staged
+from shiplog.diagnosis.linear import segments
+from shiplog.diagnosis.residual import error_location
+from shiplog.diagnosis.trial import trial_voyages
+from shiplog.diagnosis.verdict import (
+    baseline_check,
+    contradicted_causes,
+    exchanged_twins,
+    network_base,
+    sign_conventions,
+    trial_decision,
+)
+from shiplog.diagnosis.verdict import result as decisions
+from shiplog.diagnosis.verdict.held_out import HeldOut
+from shiplog.exceptions import ShiplogError
+from shiplog.machine import files
+from shiplog.machine.paths import check_diagnosis
+from shiplog.machine.unexpected import unexpected
+from shiplog.models.causes import Cause, user
+from shiplog.report.diagnosis import answer, diagnosis_pictures, page
+from shiplog.report.diagnosis.answer import Context, DiagnosedTrial
+from shiplog.report.evaluation.text_table import inert
+from shiplog.ship_profile.profile import Profile
+from shiplog.training.runs import extension_file, load_model
+from shiplog.training.runs.load_model import Run
+from shiplog.training.runs.provenance import Answer, provenance
+from shiplog.training.runs.run_checks import refuse_other_ship
+from shiplog.voyages.rows.recording import Record
+from shiplog.voyages.store import contradicted, parts
+from shiplog.voyages.store.contradicted import Contradicted
+from shiplog.voyages.store.store import Store
+from shiplog.voyages.windows.windows import Windows
+
+log = logging.getLogger(__name__)
+
+NOMINAL = 8  # segments: fewer give no nominal campaign
+
+
+# seconds of the sample logs' second season
+STAGES = {
+    "nominal voyages": 60.0, "hypotheses": 30.0, "held-out voyages": 10.0, "external forces": 5.0,
+    "report": 10.0,
+}  # fmt: skip
+
+
+@staged("diagnosing", STAGES)
+@threadpool_limits.wrap(limits=1, user_api="blas")  # of matrices too small to share out
+def diagnose_run(
+    run_path: Path,
+    store: Store,
+    voyages: Sequence[str],
+    out: Path,
+    *,
+    extend: Path | None = None,
+    cause_files: Sequence[Path] = (),
+) -> DiagnosedTrial:
+    """The whole way. Raises ShiplogError."""
+    began = time.time()
+    check_diagnosis(out, extend)
+    causes = user.load(cause_files)
+    run = load_model.load(run_path, causes)
+    names = trial_voyages.voyages_of(run, store, voyages)
+    profile = store.profile(names)
+    refuse_other_ship(run, profile)
+    recorded = trial_voyages.record_of(store, names, profile)
+    before_effect = not parts.overlapping(names, run.trained_on) and not run.given
+    nominal = _nominal(run, store, profile) if before_effect else None
+    nominal, recorded = trial_voyages.in_ship_time(run, nominal, recorded)
+    used = [*names, *store.there(run.trained_on)]
+    against = contradicted.of(store, dict.fromkeys(used))
+    if contradicted.everywhere(against):
+        done = DiagnosedTrial(answer.contradicted(run, recorded, before_effect, against), out)
+    elif answer.enough(recorded):
+        if nominal is not None and len(segments.begins(nominal)) < NOMINAL:
+            nominal = None
+        campaign = Campaigns(run, store, names, profile, recorded, nominal, before_effect, against)
+        done = _decided(campaign, out, causes)
+    else:
+        done = DiagnosedTrial(answer.too_little(run, recorded, before_effect), out)
+    _save(done, store, names, began)
+    done = _drawn(done)
+    if extend is not None:  # last: once it is there, the same command is refused
+        _extend(run, done, extend, cause_files)
+    return done
+
+
+@dataclass(frozen=True)
+class Campaigns:
+    """A run and the trial voyages; `nominal` is None where its training voyages are not stored.
+
+    before_effect   whether the run was trained on other voyages than these
+    against         short stretches that contradict themselves
+    """
+
+    run: Run
+    store: Store
+    names: Sequence[str]
+    profile: Profile
+    recorded: Record
+    nominal: Record | None
+    before_effect: bool
+    against: Sequence[Contradicted] = ()
+
+
+def _decided(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTrial:
+    """What was found; where no path of the model can be computed, that it diverges."""
+    try:
+        return _diagnosed(of, out, causes)
+    except np.linalg.LinAlgError as error:  # of a matrix that only a model out of reach makes
+        detailed = log.isEnabledFor(logging.DEBUG)
+        log.info("no path of the model can be computed: %s", error, exc_info=detailed)
+        return DiagnosedTrial(answer.runs_away(of.run, of.recorded, of.before_effect), out)
+
+
+def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTrial:
+    run, store, names, profile = of.run, of.store, of.names, of.profile
+    recorded, nominal, before_effect = of.recorded, of.nominal, of.before_effect
+    notes = answer.read_otherwise(run, profile)
+    if before_effect and nominal is None:
+        notes.append(answer.without_nominal(run, store.path))
+    if run.given:
+        notes.append(answer.of_given(run))
+    cut = trial_voyages.windows_of(run, store, names, profile)
+    before = _nominal_windows(of) if nominal is not None else None
+    if cut is not None and before is not None:
+        simulator = run.extended(run.config.seeds[0], recorded)
+        if why := sign_conventions.at_once(simulator, cut, before, profile):
+            return DiagnosedTrial(
+                answer.other_convention(run, recorded, before_effect, why, of.against, notes), out
+            )
+    lacking = baseline_check.lacking(run, store, profile) if nominal is not None else run.lacks
+    barred = contradicted_causes.barred(contradicted.channels(of.against), profile)
+    decided = trial_decision.decided(
+        run, nominal, recorded, cut, causes, lacking, reach, barred, before, profile
+    )
+    tried, judge = decided.trial, decided.judge
+    decision, found, dropped = decided.decision, decided.gain, dict(decided.refuted)
+    untested = dict(decided.untested)
+    notes += [lacking] if lacking else []
+    whole = tried.covering(decided.point)
+    reach("external forces")
+    external, out_of_reach = error_location.external(
+        tried, decided.point, whole, decision.fit.remainder, nominal
+    )
+    tried = tried.leaving_out(out_of_reach)
+    judge = None if judge is None else replace(judge, trial=tried)
+    held, network, alone = judge, None, None
+    if not run.judges_itself:
+        notes += answer.of_physics(run, tried, found)
+        network = network_base.Own(run, tried)
+        if cut is not None:
+            own = run.extended(run.config.seeds[0], recorded)
+            held = HeldOut(cut, own, tried, network, before, profile)
+            decision, found = held.simulated_with(decision)
+    lost = held.lost(found) if held else ""
+    if not lost and decision.verdict in answer.OPEN:
+        numbers = run.extension_numbers()
+        lost = exchanged_twins.explains(tried, decided.point, decision, numbers, profile)
+    if lost:
+        dropped |= {n.cause.label: answer.none_named(lost) for n in decision.named}
+        decision, found = decisions.untold(decision), None
+    elif held and decision.verdict in answer.OPEN and held.hint:
+        notes.append(held.hint)
+    simulated = (tried, decision)
+    if network is not None:
+        simulated = network.extended_by(decision)
+        whole = simulated[0].covering(simulated[1].nothing.point)
+    if held and decision.named and tried.reference.adapts:
+        notes += answer.of_own_voyages(run, tried, decision)
+        alone = held.adapted(decision).reduction if decision.adapted else None
+    reach("report")
+    context = Context(
+        run,
+        before_effect and nominal is not None,
+        untested,
+        dropped,
+        lost,
+        notes,
+        external,
+        tried.grid.seconds,
+        error_location.uncovered(run, store, names, profile, held.cut) if held else (),
+        error_location.by_channel(held) if held else (),
+        error_location.depends_on(simulated[0], simulated[1].nothing, whole),
+        alone,
+        of.against,
+    )
+    after = held.extended(decision) if held and decision.named else None
+    verdict = answer.verdict(tried, decision, found, held, context)
+    return DiagnosedTrial(verdict, out, decision, tried, simulated, whole, held, after)
+
+
+def _nominal(run: Run, store: Store, profile: Profile) -> Record | None:
+    """The training voyages of the run; None where the store does not have them."""
+    there = store.there(run.trained_on)
+    if not there:
+        return None
+    return trial_voyages.record_of(store, there, profile)
+
+
+def _nominal_windows(of: Campaigns) -> Windows | None:
+    """Those that the run was trained on, as the store has them."""
+    there = of.store.there(of.run.trained_on)
+    return trial_voyages.windows_of(of.run, of.store, there, of.profile)
+
+
+def _write(done: DiagnosedTrial) -> None:
+    done.folder.mkdir(parents=True, exist_ok=True)
+    files.write_text(done.folder / "report.md", inert(page.markdown(done.verdict)))
+    files.write_json(done.folder / "verdict.json", done.verdict.as_json())
+
+
+def _save(done: DiagnosedTrial, store: Store, names: Sequence[str], began: float) -> None:
+    """Report, verdict and provenance; pictures of an earlier diagnosis do not stay."""
+    _write(done)
+    files.remove(done.folder / answer.RECORDING)
+    files.write_json(done.folder / "provenance.json", provenance(store.hashes(names), began))
+
+
+def _drawn(done: DiagnosedTrial) -> DiagnosedTrial:
+    """The pictures, once the verdict is written. Where they fail, the answer says why."""
+    if done.recording is None:
+        return done
+    try:
+        diagnosis_pictures.save(done, done.recording)
+    except (KeyboardInterrupt, SystemExit):
+        raise
+    except BaseException as error:  # a panic of polars is no Exception
+        fault = error if isinstance(error, ShiplogError) else unexpected(error, "drawing")
+        log.warning("%s", fault)
+        return replace(done, drawn=False)
+    return done
+
+
+def _extend(run: Run, done: DiagnosedTrial, out: Path, cause_files: Sequence[Path]) -> None:
+    """The named causes as a run of its own; none, and nothing is written."""
+    if done.after is None:
+        log.info("no named cause can be part of a model: %s is not written", out)
+        return
+    extension_file.extend(run, out, done.after, cause_files)
+
+
+def diagnose_command(
+    store_path: Path,
+    run: Path,
+    *,
+    voyages: Sequence[str],
+    out: Path,
+    extend: Path | None,
+    cause_files: Sequence[Path],
+) -> Answer:
+    """`shiplog diagnose`."""
+    done = diagnose_run(
+        run, Store(store_path), voyages, out, extend=extend, cause_files=cause_files
+    )
+    text = f"{page.markdown(done.verdict)}\nReport: {out / 'report.md'}"
+    content = done.verdict.as_json()
+    if done.recording is not None:
+        text += f"\nRecording: {done.recording}"
+        content["recording"] = str(done.recording)
+    elif not done.drawn:
+        text += "\nRecording: none, it could not be made."
+    if extend is not None and done.after is not None:
+        text += f"\nExtended model: {extend}"
+    return Answer(text, content, complete=done.drawn)

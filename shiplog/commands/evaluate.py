@@ -1,0 +1,309 @@
+"""Trained runs against measured voyages: errors, baselines, coverage, and the recording of both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from shiplog.commands.bars import reach, staged
+from shiplog.exceptions import ShiplogError, listed
+from shiplog.machine.paths import refuse_same_names
+from shiplog.machine.unexpected import unexpected
+from shiplog.models.causes import user
+from shiplog.nomenclature.channels import STATE
+from shiplog.report.evaluation.evaluation import EvaluatedRuns
+from shiplog.report.viewer.comparison_data import BAND, ComparisonData, DrawnActuator
+from shiplog.simulation import baselines, prediction_interval, scoring
+from shiplog.simulation import coverage as covering
+from shiplog.training.runs import load_model
+from shiplog.training.runs.load_model import Run
+from shiplog.training.runs.run_checks import (
+    refuse_no_window,
+    refuse_other_columns,
+    refuse_other_profile,
+    refuse_other_window,
+)
+from shiplog.training.runs.voyages_to_test import held_back, say_twins
+from shiplog.voyages.store import contradicted
+from shiplog.voyages.store.store import Store
+from shiplog.voyages.windows import windows
+from shiplog.voyages.windows.split import plan
+from shiplog.voyages.windows.windows import Windows
+
+
+@staged("evaluating", {"reading": 1.0, "simulating": 3.0, "coverage": 1.0, "forces": 1.0})
+def evaluate_runs(
+    paths: Sequence[Path],
+    store: Store,
+    voyages: Sequence[str],
+    cause_files: Sequence[Path] = (),
+) -> EvaluatedRuns:
+    """Roll every run's models out over the chosen voyages. Raises ShiplogError.
+
+    cause_files   Python files of the causes of the user's own that are in these runs
+    """
+    refuse_same_names(paths)
+    causes = user.load(cause_files)
+    opened = tuple(load_model.load(path, causes) for path in paths)
+    first = opened[0]
+    for other in opened[1:]:
+        refuse_other_window(first, other)
+        refuse_other_columns(first, other.profile.columns, other.name)
+        refuse_other_profile(first, other.profile, other.name)
+    names = held_back(opened, store, voyages)
+    profile = store.profile(names)
+    refuse_other_columns(first, profile.columns, "the chosen voyages")
+    refuse_other_profile(first, profile, "the chosen voyages")
+    rows = store.seconds(names, profile)
+    for run in opened:
+        say_twins(run, rows)
+    size = first.config.window
+    planned = plan(rows, "ref", size)
+    refuse_no_window(first, names, planned)
+    cut = windows.cut(rows, planned, size, profile.actuator_names, profile.wind_names)
+    numbered = _numbered(cut)
+    reach("simulating")
+    scored, bands = [], {}
+    for run in opened:
+        models = run.models()
+        scores = {seed: scoring.score(model, cut) for seed, model in models.items()}
+        scored += [(run, seed, one) for seed, one in scores.items()]
+        bands[run.name] = _half_widths(run, models, scores, cut)
+    reach("coverage")
+    covered = _coverage(first, rows, numbered, size)
+    reach("forces")
+    return EvaluatedRuns(
+        runs=opened,
+        voyages=tuple(names),
+        too_short=tuple(sorted(set(names) - set(cut.plan["voyage"]))),
+        rows=rows,
+        errors=pl.concat(
+            [_labelled(numbered, run, seed).hstack(s.errors) for run, seed, s in scored]
+        ),
+        rollouts=pl.concat(
+            [_rollout(numbered, cut, run, seed, s, bands[run.name]) for run, seed, s in scored]
+        ),
+        coverage=covered,
+        baseline_losses=_baseline_losses(first, cut),
+        inside=_inside(scored, bands, cut),
+        forces=_forces(opened, rows),
+        contradicted=contradicted.of(store, names),
+    )
+
+
+def save(evaluation: EvaluatedRuns) -> tuple[ShiplogError, ...]:
+    """errors.parquet and rollouts.parquet into each run's folder. Returns what the system says of
+    a folder that cannot be written, such as a colleague's: the evaluation is good all the same."""
+    refused = []
+    for run in evaluation.runs:
+        mine = pl.col("run") == run.name
+        try:
+            run.save_evaluation(evaluation.errors.filter(mine), evaluation.rollouts.filter(mine))
+        except OSError as error:
+            refused.append(unexpected(error))
+    return tuple(refused)
+
+
+def comparison(evaluation: EvaluatedRuns, title: str) -> ComparisonData:
+    """What the viewer shows of an evaluation."""
+    run = evaluation.runs[0]
+    labels = {r.name: f"{r.name} ({r.config.legend})" for r in evaluation.runs}
+    profile = run.profile
+    return ComparisonData(
+        title=title,
+        ship_length=profile.ship.length_m,
+        ship_breadth=profile.ship.breadth,
+        ship_outline=profile.ship.outline or (),
+        actuators=tuple(DrawnActuator(a.name, a.kind, a.si_unit) for a in profile.actuators),
+        has_wind=profile.has_wind,
+        measured=evaluation.rows.select(
+            "voyage", pl.col("elapsed").alias("time"), *profile.columns
+        ),
+        simulated=evaluation.rollouts.with_columns(
+            model=pl.col("run").replace_strict(labels, return_dtype=pl.String)
+        ).drop("run"),
+        training=run.training().select(profile.columns),
+        summary=evaluation.text(),
+        banks=profile.site.banks,
+        trained=run.name if len(evaluation.runs) > 1 else "",
+        forces=None
+        if evaluation.forces is None
+        else evaluation.forces.with_columns(
+            model=pl.col("run").replace_strict(labels, return_dtype=pl.String)
+        ).drop("run"),
+    )
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What `compare` says and where the recording is; `lost`: what could not be written, and why.
+    Without the recording it is None, and all else is there."""
+
+    text: str
+    content: dict
+    recording: Path | None
+    lost: tuple[ShiplogError, ...] = ()
+
+    def written(self) -> Path:
+        """The recording. Raises ShiplogError where it could not be written."""
+        if self.recording is None:
+            raise self.lost[-1]
+        return self.recording
+
+
+def compare_runs(
+    paths: Sequence[Path],
+    store: Store,
+    voyages: Sequence[str],
+    save_to: Path | None,
+    cause_files: Sequence[Path] = (),
+) -> Compared:
+    """Evaluate the runs on the same windows and record both sides; in the first run's folder
+    unless a path is given."""
+    from shiplog.report import viewer
+
+    found = evaluate_runs(paths, store, voyages, cause_files)
+    lost = save(found)
+    recording = save_to or found.runs[0].path / "compare.rrd"
+    title = f"{found.runs[0].profile.ship.name}: {listed(found.voyages, most=3)}"
+    try:
+        viewer.save(comparison(found, title), recording)
+    except ShiplogError as error:
+        recording, lost = None, (*lost, error)
+    answers = {run.name: found.answer(run) for run in found.runs}
+    where = None if recording is None else str(recording)
+    content = {"contract": 1, "recording": where, "runs": answers}
+    return Compared(f"{found.text()}\n\nRecording: {where or 'none'}", content, recording, lost)
+
+
+def _numbered(cut: Windows) -> pl.DataFrame:
+    """voyage, window (counted in each voyage), segment, start, elapsed, wind_speed."""
+    return cut.plan.select(
+        "voyage",
+        pl.int_range(pl.len()).over("voyage").alias("window"),
+        "segment",
+        "start",
+        "elapsed",
+    ).with_columns(
+        wind_speed=pl.Series(
+            values=cut.wind[..., 0].mean(1) if cut.wind.shape[-1] else [None] * len(cut),
+            dtype=pl.Float64,
+        )
+    )
+
+
+def _labelled(numbered: pl.DataFrame, run: Run, seed: int) -> pl.DataFrame:
+    return numbered.select(
+        pl.lit(run.name).alias("run"),
+        pl.lit(seed).alias("seed"),
+        "voyage",
+        "window",
+        "elapsed",
+        "wind_speed",
+    )
+
+
+def _half_widths(
+    run: Run, models: dict, scores: dict[int, scoring.Scores], cut: Windows
+) -> np.ndarray | None:
+    """[N, I, 6] of the run's 90 % band: of its parameters' spread or of its seeds'."""
+    learnt = run.band()
+    if learnt is None or len(learnt.growth) != cut.state.shape[1]:
+        return None
+    simulated = [one.simulated for one in scores.values()]
+    return learnt.half_width(run.spread(models, simulated, cut))
+
+
+def _inside(scored: list, bands: dict[str, np.ndarray | None], cut: Windows) -> pl.DataFrame:
+    """run, channel, share of the samples of all seeds inside the band."""
+    rows = []
+    for run in dict.fromkeys(run.name for run, _, _ in scored):
+        half = bands[run]
+        if half is None:
+            continue
+        shares = np.mean(
+            [
+                prediction_interval.coverage(s.simulated - cut.state, half)
+                for r, _, s in scored
+                if r.name == run
+            ],
+            axis=0,
+        )
+        rows += [(run, c.name, float(shares[i])) for i, c in enumerate(STATE)]
+    schema = {"run": pl.String, "channel": pl.String, "share": pl.Float64}
+    return pl.DataFrame(rows, schema=schema, orient="row")
+
+
+def _forces(opened: tuple[Run, ...], rows: pl.DataFrame) -> pl.DataFrame | None:
+    for run in opened:
+        if (found := run.forces(rows)) is not None:
+            return found.with_columns(pl.lit(run.name).alias("run"))
+    return None
+
+
+def _rollout(
+    numbered: pl.DataFrame,
+    cut: Windows,
+    run: Run,
+    seed: int,
+    scores: scoring.Scores,
+    half: np.ndarray | None,
+) -> pl.DataFrame:
+    count, size, _ = scores.simulated.shape
+    since = np.concatenate((np.zeros((count, 1)), np.cumsum(cut.dt, 1)), 1)
+    every = pl.Series("row", range(count)).repeat_by(size).explode()
+    index = _labelled(numbered, run, seed)[every.to_list()]
+    states = scores.simulated.reshape(-1, len(STATE))
+    return index.select("run", "seed", "voyage", "window").hstack(
+        pl.DataFrame(
+            {"time": index["elapsed"].to_numpy() + since.ravel()}
+            | {c.name: states[:, j] for j, c in enumerate(STATE)}
+            | _edges(states, half)
+            | {"d": scores.d.ravel()}
+        )
+    )
+
+
+def _edges(states: np.ndarray, half: np.ndarray | None) -> dict[str, pl.Series]:
+    """<channel>_low and _high of the 90 % band; without one, nulls."""
+    wide = None if half is None else half.reshape(-1, len(STATE))
+    edges = {}
+    for j, c in enumerate(STATE):
+        for suffix, sign in zip(BAND, (-1.0, 1.0), strict=True):
+            at = None if wide is None else states[:, j] + sign * wide[:, j]
+            edges[c.name + suffix] = pl.Series(
+                values=[None] * len(states) if at is None else at, dtype=pl.Float64
+            )
+    return edges
+
+
+def _coverage(run: Run, rows: pl.DataFrame, numbered: pl.DataFrame, size: int) -> pl.DataFrame:
+    covered = covering.of(run.training(), run.profile.actuator_names, run.profile.has_wind)
+    measured = covered.table(rows, numbered, size)
+    whole = numbered.hstack(measured)
+    reasons = []
+    for row in whole.to_dicts():
+        within = rows.filter(
+            (pl.col("voyage") == row["voyage"])
+            & pl.col("elapsed").is_between(row["elapsed"], row["elapsed"] + size - 1)
+        )
+        reasons.append(covering.reason(row, within))
+    return whole.drop("segment", "start", "elapsed", "wind_speed").with_columns(
+        reason=pl.Series(reasons)
+    )
+
+
+def _baseline_losses(run: Run, cut: Windows) -> dict[str, np.ndarray]:
+    """L of both baselines on the same windows [N]; one is fitted to the run's training data."""
+    size = run.config.window
+    names = (run.profile.actuator_names, run.profile.wind_names)
+    learnt = windows.cut(run.training(), plan(run.training(), "ref", size), size, *names)
+    fitted = baselines.least_squares(learnt)
+    return {
+        name: scoring.score(model, cut).errors["loss"].to_numpy()
+        for name, model in (("hold", baselines.hold), ("least_squares", fitted))
+    }

@@ -1,0 +1,99 @@
+"""Stored voyages to what their sensors say of each other, campaign by campaign."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from datetime import datetime
+from pathlib import Path
+
+from shiplog.exceptions import listed
+from shiplog.logs.health.health_report import CONTRACT
+from shiplog.report.evaluation import tables
+from shiplog.ship_profile.profile import Profile
+from shiplog.training.runs.provenance import Answer
+from shiplog.voyages.sensors import campaign_consistency
+from shiplog.voyages.sensors.campaign_consistency import SensorCampaign
+from shiplog.voyages.sensors.sensor_findings import Estimate
+from shiplog.voyages.store import parts
+from shiplog.voyages.store.store import Store
+
+
+def campaigns(store: Store, voyages: Sequence[str]) -> list[tuple[SensorCampaign, Profile]]:
+    """Voyages of one ship, apart where none was sailed for a season. Raises StoreError."""
+    chosen = store.select(list(voyages) or None)
+    starts = {entry.name: datetime.fromisoformat(entry.start) for entry in store.entries()}
+    begins = {}
+    for name in chosen:
+        part = None if name in starts else parts.parse(name)
+        whole, later = (name, 0) if part is None else (part.whole, part.begin)
+        begins[name] = starts[whole].timestamp() + later
+    found = []
+    for names in campaign_consistency.seasons(begins):
+        profile = store.profile(names)
+        rows = dict(zip(names, (t.collect() for t in store.tables(names)), strict=True))
+        found.append((campaign_consistency.campaign(rows, profile), profile))
+    return found
+
+
+def sensors_command(store_path: Path, voyages: Sequence[str]) -> Answer:
+    """`shiplog voyages --sensors`."""
+    found = campaigns(Store(store_path), voyages)
+    text, content = [], []
+    for one, profile in found:
+        first, last = one.voyages[0], one.voyages[-1]
+        count = len(one.voyages)
+        text += [f"{count} voyages, {first} to {last}:" if count > 1 else f"{first}:", ""]
+        rows = [
+            (e.kind, e.channel, _cell(e), e.unit, "yes" if e.notable else "no",
+             ", ".join(d.voyage for d in one.deviating.get((e.kind, e.channel), ())) or "-")
+            for e in one.estimates
+        ]  # fmt: skip
+        head = ("kind", "channel", "value (90 % interval)", "unit", "reported", "deviating voyages")
+        for name, contradicting in one.contradicting.items():
+            text += [f"- contradiction in {name}: {f.sentence}" for f in contradicting]
+        text += [""] if one.contradicting else []
+        text += [tables.table(head, rows), ""] if rows else ["no two sensors can be fitted", ""]
+        text += [f"- {finding.sentence}" for finding in one.findings(profile)] + [""]
+        text += _not_compared(one)
+        content.append(_json(one, profile))
+    return Answer("\n".join(text).rstrip(), {"contract": CONTRACT, "campaigns": content})
+
+
+def _not_compared(one: SensorCampaign) -> list[str]:
+    """A line for each comparison that could not be made, and of which voyages, if not of all."""
+    lines = []
+    for left, names in one.incomparable.items():
+        where = "" if len(names) == len(one.voyages) else f" ({listed(names)})"
+        lines.append(
+            f"- not compared: {left.what}{where}: {left.reason}. It would take: {left.would_show}."
+        )
+    return [*lines, ""] if lines else []
+
+
+def _cell(e: Estimate) -> str:
+    return f"{e.value:.3f} ({e.low:.3f} to {e.high:.3f})"
+
+
+def _json(one: SensorCampaign, profile: Profile) -> dict:
+    return {
+        "voyages": list(one.voyages),
+        "estimates": [
+            {key: asdict(e)[key] for key in ("kind", "channel", "value", "low", "high", "unit")}
+            | {"said": e.notable}
+            for e in one.estimates
+        ],
+        "findings": [asdict(finding) for finding in one.findings(profile)],
+        "contradictions": [
+            {"voyage": name, **asdict(finding)}
+            for name, found in one.contradicting.items() for finding in found
+        ],
+        "not_compared": [
+            {"voyages": list(names), **asdict(left)} for left, names in one.incomparable.items()
+        ],
+        "deviating": [
+            {"kind": kind, "channel": channel, "voyage": d.voyage, "value": d.estimate.value,
+             "low": d.estimate.low, "high": d.estimate.high}
+            for (kind, channel), others in one.deviating.items() for d in others
+        ],
+    }  # fmt: skip

@@ -1,0 +1,39 @@
+"""`shiplog train --again`: a finished run once more, from its folder alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from shiplog.commands.bars import loading
+from shiplog.machine.paths import refuse_run
+from shiplog.models import NETWORK, PHYSICS
+from shiplog.training.runs import run_folder
+from shiplog.training.runs.provenance import Answer
+from shiplog.training.runs.run_checks import refuse_extended
+from shiplog.training.runs.run_folder import RunFolder
+
+
+def again_command(store_path: Path, out: Path, path: Path) -> Answer:
+    """The same settings, rows and windows as the run `path`. Raises ShiplogError."""
+    refuse_run(out)
+    old = run_folder.open_finished(path)
+    refuse_extended(path)
+    return FLOWS[old.kind.family.name](old, out, store_path)
+
+
+def _network(old: RunFolder, out: Path, store_path: Path) -> Answer:
+    with loading():
+        from shiplog.commands import train_networks
+
+    return train_networks.answer(train_networks.train_network_again(old, out), store_path)
+
+
+def _physics(old: RunFolder, out: Path, store_path: Path) -> Answer:
+    with loading():
+        from shiplog.commands import identify
+
+    run, notes = identify.identify_again(old, out)
+    return identify.answer(run, notes, store_path)
+
+
+FLOWS = {NETWORK.name: _network, PHYSICS.name: _physics}

@@ -1,0 +1,1 @@
+"""Causes in combination: evidence, relinearisation, search."""

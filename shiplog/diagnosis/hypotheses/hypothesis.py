@@ -1,0 +1,110 @@
+"""A hypothesis about a trial: a set of causes and one kind of remainder, with its prior."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shiplog.diagnosis import thresholds
+from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
+from shiplog.diagnosis.linear.linear_segments import Path
+from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
+from shiplog.diagnosis.trial.fitted import Found, Point
+from shiplog.models.causes import Cause
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a trial was linearised, without the linearisation, which takes 50 MB and more."""
+
+    numbers: Mapping[str, np.ndarray]
+    path: Path
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """Causes by label, in alphabetical order, and a remainder.
+
+    evidence   log marginal likelihood [nats], the trial counting for its share
+    score      log evidence + log prior - placebo - allowance for form errors: log posterior up to
+               a constant
+    point      the trial linearised at the causes' numbers; of a hypothesis far behind, the point
+               without relinearisation
+    found      their numbers and covariance there
+    side_force  of an intermittent remainder
+    """
+
+    causes: tuple[str, ...]
+    remainder: Remainder
+    evidence: float
+    score: float
+    point: Point | Place
+    found: Found
+    side_force: SideForce | None = None
+
+    @property
+    def kind(self) -> str:
+        return self.remainder.kind
+
+    @property
+    def noise_factor(self) -> float:
+        """As `Fit.noise_factor`."""
+        return self.remainder.overall(self.found.noise_factor)
+
+
+def name_of(label: str) -> str:
+    """`clock_offset:wind` is the wind's clock."""
+    return label.partition(":")[0]
+
+
+def holds_one(without: Collection[frozenset[str]], labels: Sequence[str]) -> bool:
+    """Whether these causes have all names of one of the sets."""
+    names = set(map(name_of, labels))
+    return any(one <= names for one in without)
+
+
+class Priors:
+    """Log prior of every hypothesis about one ship; causes of one name share that name's."""
+
+    def __init__(self, catalogue: Sequence[Cause], families: Sequence[str]) -> None:
+        names = [name_of(cause.label) for cause in catalogue]
+        self.each = {
+            cause.label: -math.log(len(set(names)) * names.count(name_of(cause.label)))
+            for cause in catalogue
+        }
+        kinds = (RAISED, INTERMITTENT, *families)
+        self.kinds = dict.fromkeys(kinds, math.log(thresholds.REMAINDER / len(kinds)))
+        self.kinds[NOMINAL] = math.log(1.0 - thresholds.REMAINDER)
+
+    def causes(self, labels: Sequence[str]) -> float:
+        if not labels:
+            return math.log(thresholds.NO_CHANGE)
+        further = (len(labels) - 1) * math.log(thresholds.ANOTHER_CAUSE)
+        further += math.lgamma(len(labels) + 1.0)  # n! orders of n causes are one set
+        return math.log(1.0 - thresholds.NO_CHANGE) + further + sum(self.each[n] for n in labels)
+
+    def of(self, labels: Sequence[str], kind: str) -> float:
+        return self.causes(labels) + self.kinds[kind]
+
+
+def form_error_of(cause: Cause) -> float:
+    """Share of its force or reading that a cause's equations may leave wrong."""
+    return max(thresholds.FORM_ERROR, cause.form_error)
+
+
+def form_error(
+    alone: Mapping[str, float], labels: Sequence[str], by: Mapping[str, Cause], force: float = 0.0
+) -> float:
+    """Allowance, in nats, for further causes that imitate the form error of another one, or of an
+    intermittent force: of the one that leaves most.
+
+    alone   log Bayes factor of each cause by itself, over no cause
+    by      label → cause
+    force   log Bayes factor of an intermittent force by itself, where these causes act with one
+    """
+    left = (form_error_of(by[n]) ** 2 * alone.get(n, 0.0) for n in labels)
+    of_causes = max(0.0, *left) * (len(labels) - 1) if len(labels) > 1 else 0.0
+    return max(of_causes, thresholds.FORM_ERROR**2 * force * len(labels))

@@ -1,0 +1,183 @@
+"""The named causes, linearised again at their estimates, with a path of their own, until they
+converge.
+
+Gauss-Newton with step halving. The length of a step is measured in standard deviations of the
+numbers (Mahalanobis distance). A step is rejected, and halved, if the numbers are then far less
+probable and the next step is longer.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shiplog.diagnosis.hypotheses import evidence
+from shiplog.diagnosis.linear.linear_segments import Path
+from shiplog.diagnosis.noise.remainder import Remainder
+from shiplog.diagnosis.trial.fitted import Found, Point
+from shiplog.diagnosis.trial.trial import Trial
+
+RELINEARISATIONS = 10  # of linearising again, at most
+AWAY = 1e4  # m, m/s or rad, that no ship is off in half a minute
+LOST_NATS = 10.0  # of the numbers' log density: a step that loses more may be rejected
+MOST_HALVINGS = 3  # of one step, at most
+LEFT = 0.2  # standard deviations: expected distance from the optimum, at which a fit has converged
+# Of convergence, until two steps give it: length of a step over that of the last one. A clock may
+# reach 0.8; with this, a first step of more than half a standard deviation is not the last one.
+RATE = 0.3
+STEADY = 0.05  # of the logarithm of the process noise, from one round to the next: converged
+
+
+@dataclass(frozen=True)
+class _Iterate:
+    """A point, the fit made there, and the length of the step to its numbers [sd]."""
+
+    point: Point
+    base: Found
+    step: float
+
+    def rejected(self, before: _Iterate) -> bool:
+        """Whether the step from the iterate before went too far."""
+        lost = before.base.density - self.base.density
+        return self.step > before.step and lost > LOST_NATS
+
+    def converged(self, before: _Iterate | None, damping: float) -> bool:
+        """Whether further steps would change neither the numbers nor the evidence. Convergence is
+        taken for linear; after a damped step its rate is not known."""
+        rate, gained = RATE, math.inf
+        if before is not None and before.step > 0.0 and damping == 1.0:
+            rate = min(self.step / before.step, 0.99)
+            gained = self.base.density - before.base.density
+        little = max(gained, 0.5 * self.step**2) < evidence.LITTLE_NATS
+        return little or self.step * rate / (1.0 - rate) < LEFT
+
+    def at_point(self) -> Found:
+        """The fit with the point's own numbers, in the order of its covariance, without the gain
+        that the step promises."""
+        stood = {name: self.point.numbers[name] for name in self.base.numbers}
+        return replace(self.base, numbers=stood,
+                       evidence=self.base.evidence - 0.5 * self.step**2)  # fmt: skip
+
+
+def converge(
+    trial: Trial,
+    included: Sequence[str],
+    numbers: Mapping[str, np.ndarray],
+    path: Path | None,
+    lowest: float = -np.inf,
+    remainder: Remainder = evidence.NO_CHANGE_OF_NOISE,
+) -> tuple[Point, Found]:
+    """These causes together, linearised again until their numbers converge.
+
+    They start from where an earlier fit of them converged, if there was one. A step is rejected,
+    too, if the evidence is below the `lowest` that is possible, about a path that the process noise
+    found there allows. A fit that does not converge has the evidence of the most probable numbers
+    that it met.
+    """
+    # where each channel has a factor of its own the common one stays near 1; an intermittent force
+    # is estimated together with the nominal process noise, which is then kept
+    noise_factor, lately = 1.0, 1.0 if remainder.shaped else None
+    held = remainder.intermittent is not None
+    near: Path | Point | None = path
+    key = (tuple(included), remainder)
+    if key in trial.converged:
+        numbers, near, noise_factor = trial.converged[key]
+        lately = noise_factor
+    last: _Iterate | None = None  # that was accepted
+    best: _Iterate | None = None
+    halvings, damping = 0, 1.0  # of a step; it grows back once steps are accepted
+    steady = held  # whether the process noise has converged: a round then keeps it
+    for _ in range(RELINEARISATIONS):
+        try:
+            point = trial.at(numbers, near, noise_factor, remainder)
+            base = _fitted(trial, point, included, remainder, lately, steady)
+            if base.evidence < lowest:
+                if abs(math.log(base.noise_factor / noise_factor)) < STEADY:
+                    raise np.linalg.LinAlgError("a step too far")
+                near, noise_factor = point, base.noise_factor  # too firm a path, with any numbers
+                continue
+            here = _Iterate(point, base, _length(point, base, included))
+            if last is not None and here.rejected(last):
+                raise np.linalg.LinAlgError("a step too far")
+        except np.linalg.LinAlgError:  # the fit diverged, and its path with it
+            free = [name for name in included if name not in trial.fixed]
+            if halvings == MOST_HALVINGS or not free:
+                break
+            halvings, damping = halvings + 1, 0.5 * damping
+            half = _half_way(numbers, last.point.numbers if last else None, free[-1])
+            numbers = trial.clipped(half)
+            continue
+        converged = here.converged(last, damping)
+        settled = lately is not None and abs(math.log(base.noise_factor / lately)) < STEADY
+        kept, steady = steady, held or settled
+        last, damping = here, damping if halvings else min(2.0 * damping, 1.0)
+        halvings = 0
+        if best is None or base.density >= best.base.density:
+            best = here
+        near, noise_factor = point, base.noise_factor
+        numbers = trial.clipped(_towards(base.numbers, point.numbers, damping))
+        lately = noise_factor
+        if not all(np.isfinite(values).all() for values in numbers.values()):
+            return point, replace(base, name="+".join(included), evidence=-np.inf)
+        if converged:
+            if kept and not held:
+                base, _ = evidence.scan(trial, point, (), included, lately, remainder)
+            trial.converged[key] = (base.numbers, point.path, base.noise_factor)
+            return point, replace(base, name="+".join(included))
+    return _not_converged(trial, included, remainder, best, numbers)
+
+
+def _not_converged(
+    trial: Trial, included: Sequence[str], remainder: Remainder, best: _Iterate | None,
+    numbers: Mapping[str, np.ndarray],
+) -> tuple[Point, Found]:  # fmt: skip
+    """Of a fit that did not converge: the best that it met, or no evidence."""
+    name = "+".join(included)
+    if best is None:
+        assert trial.first is not None
+        return trial.first, Found(name, -np.inf, 1.0, numbers)
+    found = (best.point.numbers, best.point.path, best.base.noise_factor)
+    trial.converged[tuple(included), remainder] = found
+    return best.point, replace(best.at_point(), name=name)
+
+
+def _length(point: Point, base: Found, included: Sequence[str]) -> float:
+    """Of the step from a point's numbers to the most probable ones there, standard deviations."""
+    if not included:
+        return 0.0
+    assert base.covariance is not None
+    step = np.concatenate([base.numbers[n] - point.numbers[n] for n in included])
+    return math.sqrt(max(float(step @ np.linalg.solve(base.covariance, step)), 0.0))
+
+
+def _fitted(
+    trial: Trial, point: Point, included: Sequence[str], remainder: Remainder,
+    lately: float | None, steady: bool,
+) -> Found:  # fmt: skip
+    """The hypothesis at a point. Raises np.linalg.LinAlgError where the path diverged."""
+    if np.abs(point.linear.e).max() > AWAY:
+        raise np.linalg.LinAlgError("the path diverged")
+    if steady and lately is not None:
+        return evidence.fit(trial, point, included, lately, remainder)
+    return evidence.scan(trial, point, (), included, lately, remainder)[0]
+
+
+def _half_way(
+    numbers: Mapping[str, np.ndarray], accepted: Mapping[str, np.ndarray] | None, last: str
+) -> Mapping[str, np.ndarray]:
+    """Half a step from the accepted numbers; where there are none, half of the last free cause."""
+    if accepted is None:
+        return {**numbers, last: 0.5 * numbers[last]}
+    return _towards(numbers, accepted, 0.5)
+
+
+def _towards(
+    numbers: Mapping[str, np.ndarray], begin: Mapping[str, np.ndarray], share: float
+) -> Mapping[str, np.ndarray]:
+    """A share of the step from `begin` to these numbers."""
+    if share == 1.0:
+        return numbers
+    return {n: share * values + (1.0 - share) * begin[n] for n, values in numbers.items()}

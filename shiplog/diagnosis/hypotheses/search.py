@@ -1,0 +1,176 @@
+"""The search: which hypotheses are weighed, starting from the best ones so far.
+
+Each set of causes is linearised again at its most probable numbers, and weighed under every kind of
+remainder. One cause is then added to the best hypotheses or dropped from them, until no promising
+set is left. A remainder may explain a part of what a cause explains wholly. As long as a cause
+promises about as much as the best hypothesis has, it is therefore added to nothing as well. The
+order in which sets are weighed matters for those alone that are far behind.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from shiplog.diagnosis import thresholds
+from shiplog.diagnosis.hypotheses import evidence
+from shiplog.diagnosis.hypotheses.hypothesis import Hypothesis, holds_one, name_of
+from shiplog.diagnosis.hypotheses.table import Hypotheses
+from shiplog.diagnosis.hypotheses.weighing import SEARCH_NATS, weigh, weigh_as
+from shiplog.diagnosis.noise.remainder import NOMINAL
+from shiplog.diagnosis.trial.fitted import ExpectedEvidence, Fit, Point
+from shiplog.diagnosis.trial.trial import Trial
+from shiplog.models.causes import Cause
+
+MOST_CAUSES = 5  # of a hypothesis; of a ship with more the given coefficients are another ship's
+MOST_SETS = 16  # that are linearised; the others are far behind
+LIKELY = 0.3  # share of the best one's evidence: before it is linearised a cause may lack more
+CONTENDERS = 3  # causes that are tried from one hypothesis
+
+
+log = logging.getLogger(__name__)
+
+
+class Search:
+    """The moves from set to set.
+
+    table     the hypotheses weighed so far
+    expected  label → expected log Bayes factor of that cause, by its size
+    scanned   label → score of that cause by itself, scanned before any set is searched
+    likely    numbers of a set of causes that is likely from the start, by label
+    """
+
+    def __init__(
+        self, trial: Trial, point: Point, placebo: Mapping[str, float],
+        likely: Mapping[str, np.ndarray] | None = None,
+    ) -> None:  # fmt: skip
+        self.table = Hypotheses(trial, point, placebo)
+        self.likely = dict(likely or {})
+        self.expected: dict[str, ExpectedEvidence] = {}
+        self.scanned: dict[str, float] = {}
+        self._most = MOST_SETS
+        self._tried: set[tuple[str, ...]] = set()
+        self._expanded: set[tuple[tuple[str, ...], str]] = set()
+
+    def run(self) -> None:
+        """Evaluate hypotheses until no further one is promising."""
+        if () not in self._tried:
+            self._weigh((), {}, self.table.first)
+            self._scan_each_alone()
+            if self.likely:
+                self._weigh(tuple(sorted(self.likely)), self.likely, self.table.first)
+        while len(self._tried) < self._most:
+            ranked = self.table.ranked()
+            least = ranked[0].score - SEARCH_NATS
+            allowed = (s for label, s in self.scanned.items() if not self._banned((label,)))
+            promising = max(allowed, default=least) > least
+            near = [h for h in ranked if h.score > least or (promising and h is self.table.nothing)]
+            fresh = [h for h in near if (h.causes, h.kind) not in self._expanded]
+            if not fresh:
+                break
+            self._expand(fresh[0])
+        self.table.rescore()
+
+    def without(self, *names: str) -> None:
+        """Go on without a cause, or without these together, for as many sets again: those behind
+        were hardly weighed."""
+        self.table.banned.add(frozenset(names))
+        self._most = len(self._tried) + MOST_SETS
+        self._expanded.clear()
+        self.run()
+
+    @property
+    def diverged(self) -> set[str]:
+        """Labels of causes that explain something where they are linearised, and whose fit by
+        themselves diverges from there."""
+        return {
+            labels[0] for labels in self._tried
+            if len(labels) == 1 and (labels, NOMINAL) not in self.table.found
+        }  # fmt: skip
+
+    def _banned(self, labels: Sequence[str]) -> bool:
+        return holds_one(self.table.banned, labels)
+
+    def _weigh(self, labels: tuple[str, ...], numbers: Mapping[str, np.ndarray], at: Point) -> None:
+        self._tried.add(labels)
+        weigh(self.table, labels, numbers, at)
+
+    def _weigh_again(self, labels: tuple[str, ...], one: Hypothesis, fit: Fit) -> None:
+        """A set with one cause less than the best hypothesis, with that one's noise: it may have
+        been weighed with noise that was less probable, which is no evidence for the cause."""
+        if one is self.table.ranked()[0] and weigh_as(self.table, labels, one, fit):
+            self._expanded.discard((labels, one.kind))
+
+    def _expand(self, one: Hypothesis) -> None:
+        """The sets with one cause more or less than a hypothesis has."""
+        self._expanded.add((one.causes, one.kind))
+        fit = self.table.fit(one)
+        best = self.table.ranked()[0].score
+        for labels, numbers, predicted in self._additions(one, fit):
+            first = not one.causes and one.score > best - SEARCH_NATS
+            worth = first or predicted > best - SEARCH_NATS
+            if worth and labels not in self._tried and len(self._tried) < self._most:
+                self._weigh(labels, numbers, fit.point)
+        for label in one.causes if len(one.causes) > 1 else ():
+            labels = tuple(n for n in one.causes if n != label)
+            if labels in self._tried:
+                self._weigh_again(labels, one, fit)
+            elif len(self._tried) < self._most:
+                self._weigh(labels, {n: one.found.numbers[n] for n in labels}, fit.point)
+
+    def _additions(
+        self, one: Hypothesis, fit: Fit
+    ) -> list[tuple[tuple[str, ...], dict[str, np.ndarray], float]]:
+        """The sets with one cause more that are worth a look: labels, numbers, score expected."""
+        if len(one.causes) >= MOST_CAUSES:
+            return []
+        table = self.table
+        candidates = [
+            c for c in table.catalogue
+            if c.label not in one.causes and not self._banned((*one.causes, c.label))
+            and all(_compatible(c, table.by[label]) for label in one.causes)
+        ]  # fmt: skip
+        _, found = evidence.scan(
+            table.trial, fit.point, candidates, table.included(one.causes),
+            one.found.noise_factor, one.remainder,
+        )  # fmt: skip
+        additions = []
+        for f in found:
+            if f.evidence <= 0.0 or f.evidence < LIKELY * found[0].evidence:
+                continue
+            labels = tuple(sorted((*one.causes, f.name)))
+            numbers = {**one.found.numbers, **f.numbers}
+            score = table.score(one.evidence + f.evidence, labels, one.kind)
+            additions.append((labels, numbers, score))
+        return additions[:CONTENDERS]
+
+    def _scan_each_alone(self) -> None:
+        """What each cause explains by itself, and what would show of it, whatever is searched."""
+        table, nothing = self.table, self.table.nothing
+        _, found = evidence.scan(
+            table.trial, table.fit(nothing).point, table.catalogue, table.included(()),
+            nothing.found.noise_factor,
+        )  # fmt: skip
+        table.alone |= {f.name: f.evidence for f in found}
+        self.scanned = {
+            f.name: table.score(nothing.evidence + f.evidence, (f.name,), NOMINAL) for f in found
+        }
+        self.expected = {f.name: f.expected for f in found if f.expected is not None}
+        self._say_what_would_not_show()
+
+    def _say_what_would_not_show(self) -> None:
+        """Log the causes that these voyages cannot reveal, before any is searched for."""
+        shares = {
+            name: expected.together(thresholds.SHOWS_NATS)
+            for name, expected in self.expected.items()
+        }
+        blind = [f"{name_of(n)} below {s:.0%}" for n, s in shares.items() if s > 1.0]
+        if blind:
+            log.info("not detectable at realistic size: %s", ", ".join(dict.fromkeys(blind)))
+
+
+def _compatible(one: Cause, other: Cause) -> bool:
+    """Whether both may be in one hypothesis: either may say that they may not."""
+    return one.compatible(other.label) and other.compatible(one.label)

@@ -1,0 +1,1 @@
+"""Segments, and the model linearised about each."""

@@ -1,0 +1,105 @@
+"""What causes read otherwise than it was recorded, and how their numbers change it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from shiplog.diagnosis.linear import segments
+from shiplog.diagnosis.linear.parameter_layout import Columns
+from shiplog.diagnosis.linear.segments import Cut
+from shiplog.models.causes import Cause, Setting
+from shiplog.models.extended import Extended
+from shiplog.voyages.rows.recording import Record
+
+AVERAGING_S = 2.0  # s: a clock's column is a derivative, and its noise would pass for what it tells
+# Of a cause's size, to see how it changes what is read: less, and noise drowns a delay
+READ_STEP = 0.3
+
+
+def corrected(causes: Sequence[Cause], record: Record, numbers: Mapping[str, np.ndarray]) -> Record:
+    """The record as those causes' numbers have it, in the catalogue's order."""
+    for cause in causes:
+        values = numbers.get(cause.label)
+        if values is not None and np.any(values != 0.0):
+            record = cause.read(record, values)
+    return record
+
+
+def factors(causes: Sequence[Cause], numbers: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Family of the discrepancy → factor [3] (1) of X, Y and N that depend on its inputs: the
+    product over causes, label → numbers, SI, of what each `scales`."""
+    found: dict[str, np.ndarray] = {}
+    for cause in causes:
+        if (values := numbers.get(cause.label)) is None or not np.any(values != 0.0):
+            continue
+        for family, factor in cause.scales(np.asarray(values)).items():
+            found[family] = found.get(family, np.ones(3)) * factor
+    return found
+
+
+def water(causes: Sequence[Cause], numbers: Mapping[str, np.ndarray]) -> np.ndarray:
+    """[2] velocity of the water along x₀ and y₀ [m/s], label → numbers, SI: the sum over causes."""
+    found = np.zeros(2)
+    for cause in causes:
+        if (values := numbers.get(cause.label)) is None:
+            continue
+        if (moving := cause.water(np.asarray(values))) is not None:
+            found += np.asarray(moving, dtype=float)
+    return found
+
+
+def as_hypothesised(cut: Cut, causes: Sequence[Cause], numbers: Mapping[str, np.ndarray]) -> Cut:
+    """The segments with what the causes' numbers do to size and inputs of the discrepancy."""
+    return replace(cut, factors=factors(causes, numbers), water=water(causes, numbers))
+
+
+def read(
+    model: Extended,
+    setting: Setting,
+    record: Record,
+    rows: np.ndarray,
+    numbers: Mapping[str, np.ndarray] | None = None,
+) -> tuple[Cut, np.ndarray, np.ndarray]:
+    """Segments as read with `numbers`, and how each cause's numbers change them there: a clock's
+    by the motion averaged over seconds, as its noise tells nothing of a clock."""
+    given = dict(numbers or {})
+    sizes = {c.label: c.sizes(setting) for c in model.causes}
+    columns = Columns(0, model.causes, np.concatenate([*sizes.values(), np.zeros(0)]))
+    base = segments.cut(corrected(model.causes, record, given), rows)
+    base = as_hypothesised(base, model.causes, given)
+    moved = np.zeros((*base.driven.shape, len(columns.unit)))
+    observed = np.zeros((*base.y.shape, len(columns.unit)))
+    before = record  # as the causes before this one have it
+    averaged, of = record, None  # that record averaged, which several clocks share
+    for place, cause in enumerate(model.causes):
+        if not cause.reads:
+            continue
+        here = given.get(cause.label, np.zeros(cause.count))
+        low, high = cause.bounds(setting)
+        if cause.shifts and of is not before:
+            averaged, of = before.smoothed(AVERAGING_S), before
+        moving = averaged if cause.shifts else before
+        for i, column in enumerate(columns.of[cause.label]):
+            step = np.zeros(cause.count)
+            step[i] = READ_STEP * sizes[cause.label][i]
+            # not beyond what it may be: a lag that is negative sharpens steps and noise
+            ends = np.minimum(here + step, high), np.maximum(here - step, low)
+            apart = ends[0][i] - ends[1][i]
+            more, less = (
+                corrected(model.causes[place + 1 :], cause.read(moving, end), given) for end in ends
+            )
+            # of what both share nothing changes
+            if more.actuator is not less.actuator:
+                change = segments.at_nodes(record, rows, more.actuator - less.actuator)
+                moved[..., : change.shape[-1], column] = change / apart
+            if more.wind is not less.wind or more.state is not less.state:
+                change = segments.at_nodes(record, rows, more.true_wind - less.true_wind)
+                moved[..., -2:, column] = change / apart
+            if more.state is not less.state:
+                between = replace(more, state=more.state - less.state)
+                observed[..., column] = segments.averaged(between, rows) / apart
+        before = corrected((cause,), before, given)
+    return base, moved, observed

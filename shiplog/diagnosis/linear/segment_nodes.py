@@ -1,0 +1,60 @@
+"""Motion, controls and accelerations at the nodes of segments, channel by channel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shiplog.diagnosis.linear.linearisation import resampled
+from shiplog.diagnosis.linear.segments import Cut, SegmentGrid
+from shiplog.nomenclature import frames
+
+
+@dataclass(frozen=True)
+class Knots:
+    """What went on at the knots of S segments.
+
+    state   [S, J, 6]      velocities through the water
+    driven  [S, J, A + 3]  actuators, share of the campaign, wind over the water
+    """
+
+    state: np.ndarray
+    driven: np.ndarray
+
+
+def at_knots(segments: Cut, g: SegmentGrid) -> Knots:
+    centre = (np.arange(g.bins) + 0.5) * g.seconds / g.bins
+    every = round(g.knot / (g.step * g.every))
+    state = resampled(centre, segments.y, np.arange(g.knots) * g.knot)
+    driven = segments.driven[:, ::every]
+    if segments.water.any():
+        north, east = segments.water
+        c, s = np.cos(state[..., 4]), np.sin(state[..., 4])
+        ahead, starboard = frames.in_body_axes(north, east, c, s)
+        state[..., 1] -= ahead
+        state[..., 3] -= starboard
+        driven = driven.copy()
+        driven[..., -2:] += segments.water  # the apparent wind stays as it is
+    return Knots(state, driven)
+
+
+def rows_at_knots(begins: np.ndarray, g: SegmentGrid) -> np.ndarray:
+    """[S, J] of the record, of segments that begin at these rows [S]."""
+    return begins[:, None] + round(g.knot / g.step) * np.arange(g.knots)
+
+
+def in_each_channel(waves: np.ndarray) -> np.ndarray:
+    """[S, J, F] → [S, J, 3, 3F]."""
+    count = waves.shape[-1]
+    out = np.zeros((*waves.shape[:2], 3, 3 * count))
+    for channel in range(3):
+        out[..., channel, channel * count : (channel + 1) * count] = waves
+    return out
+
+
+def accelerations(features: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
+    """[S, 3J, W]: acceleration of each weight at the knots, channel by channel; `acceleration` [3]
+    is the unit of size."""
+    scaled = np.moveaxis(features * acceleration[:, None], 2, 1)
+    return scaled.reshape(len(scaled), -1, scaled.shape[-1])

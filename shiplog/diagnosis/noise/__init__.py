@@ -1,0 +1,1 @@
+"""Likelihood of the residuals: process noise, its factors, effects of campaigns."""

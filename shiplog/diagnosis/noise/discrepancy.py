@@ -1,0 +1,261 @@
+"""The discrepancy: a model's error as functions of its inputs, and of omitted inputs.
+
+Equations of another form leave an acceleration that depends on motion, controls or wind. No model
+of forces has one that depends on position, heading or time. Each family is a sum of fixed features
+with unknown weights (Kennedy & O'Hagan 2001). The weights of motion, controls and wind are
+estimated from the nominal campaign. An unknown structure of the trial is a change of one family's
+weights.
+
+Features of motion, controls and wind are the products of ship hydrodynamics (Abkowitz 1964; moduli
+after Fedyaevsky & Sobolev 1964) and smooth random features (Rahimi & Recht 2007). A dependence on
+position, heading or time acts from outside the ship. Its first features are a force along the
+earth's axes that is steady or grows evenly, such as a line's or a tug's; smooth features follow.
+The even force is expected to be larger than the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shiplog.diagnosis.linear import segment_nodes
+from shiplog.diagnosis.linear.segment_nodes import Knots
+from shiplog.diagnosis.linear.segments import Cut, SegmentGrid
+from shiplog.models.mmg import geometry
+from shiplog.nomenclature import frames
+from shiplog.ship_profile.profile import Actuator, Profile
+
+SEEN = ("motion", "controls", "wind")  # by a model of forces
+UNSEEN = ("position", "heading", "time")
+EVEN = {"position": 3, "heading": 1, "time": 2}  # features of an even force, the first ones
+HARD_OVER = np.deg2rad(35.0)  # of most rudders (SOLAS II-1/29)
+WAVES = {"motion": 10, "controls": 10, "wind": 4, "position": 14, "heading": 6, "time": 5}
+
+
+@dataclass(frozen=True)
+class Waves:
+    """Smooth features of inputs z [..., n], standardised: √(2/F) cos(z·frequency + phase).
+
+    middle, width  [n] mean and standard deviation over the campaigns
+    frequency      [n, F]; phase [F]
+    """
+
+    middle: np.ndarray
+    width: np.ndarray
+    frequency: np.ndarray
+    phase: np.ndarray
+
+    def __call__(self, z: np.ndarray) -> np.ndarray:
+        scaled = (z - self.middle) / self.width
+        return np.sqrt(2.0 / len(self.phase)) * np.cos(scaled @ self.frequency + self.phase)
+
+
+@dataclass(frozen=True)
+class Family:
+    """One family: `columns` of the discrepancy's weights, and its features at the knots.
+
+    level    [F] subtracted from each feature, and scale [F] by which it is divided, both over the
+             campaigns; F with the features of an even force
+    """
+
+    name: str
+    profile: Profile
+    waves: Waves
+    level: np.ndarray
+    scale: np.ndarray
+    columns: np.ndarray
+
+    def features(self, knots: Knots) -> np.ndarray:
+        """[S, J, 3, 3F]: acceleration of each weight, in units of the process noise."""
+        values = (features(self.name, self.profile, self.waves, knots) - self.level) / self.scale
+        plain = EVEN.get(self.name, 0)
+        out = segment_nodes.in_each_channel(values[..., plain:] / np.sqrt(values.shape[-1] - plain))
+        if self.name == "position":
+            out = _turned(out, knots)
+        if not plain:
+            return out
+        even = segment_nodes.in_each_channel(values[..., :plain])
+        even[..., 2, 2 * plain] = 0.0  # a steady moment is the ship's own
+        return np.concatenate((_turned(even, knots), out), -1)
+
+
+@dataclass(frozen=True)
+class Discrepancy:
+    """All families of one ship. acceleration [3]: the unit of each channel's acceleration."""
+
+    families: tuple[Family, ...]
+    acceleration: np.ndarray
+
+    @property
+    def count(self) -> int:
+        return sum(len(family.columns) for family in self.families)
+
+    def accelerations(self, cut: Cut, g: SegmentGrid) -> np.ndarray:
+        """[S, 3J, W]: acceleration of each weight at the knots, channel by channel."""
+        if not self.families:
+            return np.zeros((len(cut), 3 * g.knots, 0))
+        knots = segment_nodes.at_knots(cut, g)
+        parts = []
+        for family in self.families:
+            of = family.features(knots)
+            if family.name in cut.factors:
+                of = of * cut.factors[family.name][:, None]
+            parts.append(segment_nodes.accelerations(of, self.acceleration))
+        return np.concatenate(parts, axis=-1)
+
+
+def of(
+    profile: Profile, acceleration: np.ndarray, first: int, names: Sequence[str], *campaigns: Knots
+) -> Discrepancy:
+    """The families that these campaigns can show anything of.
+
+    first   column of the first weight
+    """
+    found: list[Family] = []
+    for name in names:
+        if name == "wind" and not profile.has_wind:
+            continue
+        waves = _waves(name, *campaigns)
+        if waves is None:
+            continue
+        parts = [features(name, profile, waves, knots) for knots in campaigns]
+        both = np.concatenate([values.reshape(-1, values.shape[-1]) for values in parts])
+        # a constant force depends on nothing
+        level = both.mean(0) if name in UNSEEN else np.zeros(both.shape[-1])
+        level[: EVEN.get(name, 0)] = 0.0  # but along the earth's axes it depends on the heading
+        scale = np.sqrt(((both - level) ** 2).mean(0))
+        # a feature that hardly varies says nothing, and must not be blown up
+        scale = np.maximum(scale, 1e-3 * max(float(scale.max()), 1e-9))
+        columns = np.arange(first, first + 3 * len(level))
+        first += len(columns)
+        found.append(Family(name, profile, waves, level, scale, columns))
+    return Discrepancy(tuple(found), acceleration)
+
+
+def _waves(name: str, *campaigns: Knots) -> Waves | None:
+    """None where nothing of the family varies."""
+    z = np.concatenate([v.reshape(-1, v.shape[-1]) for v in (_inputs(name, k) for k in campaigns)])
+    width = z.std(0)
+    if not (width > 1e-9).any():
+        return None
+    count = WAVES[name]
+    if name == "heading":  # harmonics of one angle: cosine and sine come from the phase
+        order = np.arange(count) // 2 + 1
+        phase = np.where(np.arange(count) % 2, -0.5 * np.pi, 0.0)
+        return Waves(np.zeros(1), np.ones(1), order[None].astype(float), phase)
+    rng = np.random.default_rng([len(name), *name.encode()])
+    frequency = rng.standard_normal((z.shape[1], count)) / np.sqrt(max(z.shape[1] / 2.0, 1.0))
+    phase = rng.uniform(0.0, 2.0 * np.pi, count)
+    return Waves(z.mean(0), np.where(width > 1e-9, width, 1.0), frequency, phase)
+
+
+def features(name: str, profile: Profile, waves: Waves, knots: Knots) -> np.ndarray:
+    """[S, J, F]"""
+    inputs = _inputs(name, knots)
+    smooth = waves(inputs)
+    if name in UNSEEN:
+        return np.concatenate((_even(name, inputs, waves), smooth), -1)
+    products = PRODUCTS.get(name)
+    if products is None:
+        return smooth
+    return np.concatenate((*products(profile, knots), smooth), -1)
+
+
+def _even(name: str, inputs: np.ndarray, waves: Waves) -> np.ndarray:
+    """[S, J, EVEN] of a force along the earth's axes: steady, and growing with each input."""
+    steady = np.ones_like(inputs[..., :1])
+    if name == "heading":  # felt by the ship, a steady force already turns with it
+        return steady
+    return np.concatenate((steady, (inputs - waves.middle) / waves.width), -1)
+
+
+def _inputs(name: str, knots: Knots) -> np.ndarray:
+    state, driven = knots.state, knots.driven
+    if name == "position":
+        return state[..., [0, 2]]
+    if name == "heading":
+        return state[..., [4]]
+    if name == "time":
+        return driven[..., [-3]]
+    if name == "motion":
+        return state[..., [1, 3, 5]]
+    if name == "controls":
+        return np.concatenate((driven[..., :-3], state[..., [1]]), -1)
+    return apparent_flow(knots)
+
+
+def apparent_flow(knots: Knots) -> np.ndarray:
+    """[..., 2] where the apparent wind comes from, ahead and to starboard [m/s]."""
+    state = knots.state
+    c, s = np.cos(state[..., 4]), np.sin(state[..., 4])
+    ahead, starboard = frames.in_body_axes(knots.driven[..., -2], knots.driven[..., -1], c, s)
+    return np.stack((ahead + state[..., 1], starboard + state[..., 3]), -1)
+
+
+def _of_motion(profile: Profile, knots: Knots) -> list[np.ndarray]:
+    u, v, r = (knots.state[..., [i]] for i in (1, 3, 5))
+    return [
+        u, v, r, u * np.abs(u), v * np.abs(v), r * np.abs(r), u * v, u * r, v * r,
+        np.abs(u) * v, np.abs(u) * r, np.abs(v) * r, np.abs(r) * v,
+    ]  # fmt: skip
+
+
+def _of_controls(profile: Profile, knots: Knots) -> list[np.ndarray]:
+    """Of every unit that drives n|n| and |n|u; of every angle δ sin δ u|u|, 1 - cos δ, and both in
+    the stream of each unit of `driven_by`. A rudder's force need not go on with its angle (stall,
+    play, a stop): sin(πδ/δ_max), times u|u| and in the same streams."""
+    u = knots.state[..., [1]]
+    driving = [i for i, a in enumerate(profile.actuators) if a.kind in ("propeller", "thruster")]
+    found = []
+    for i in driving:
+        n = knots.driven[..., [i]]
+        found += [n * np.abs(n), np.abs(n) * u]
+    for i, actuator in enumerate(profile.actuators):
+        if actuator.kind not in ("rudder", "azimuth"):
+            continue
+        angle = knots.driven[..., [i]]
+        found += [np.sin(angle) * u * np.abs(u), 1.0 - np.cos(angle)]
+        bent = []
+        if actuator.kind == "rudder":
+            bent = [np.sin(np.pi * angle / hard_over(actuator))]
+        for j in driven_by(profile, i, driving):
+            thrust = knots.driven[..., [j]] * np.abs(knots.driven[..., [j]])
+            found += [thrust * np.sin(angle), thrust * (1.0 - np.cos(angle))]
+            found += [thrust * shape for shape in bent]
+        found += [shape * u * np.abs(u) for shape in bent]
+    return found
+
+
+def hard_over(rudder: Actuator) -> float:
+    """The largest angle of a rudder, rad: of its limits, or 35 degrees without any."""
+    return geometry.reach(rudder) or HARD_OVER
+
+
+def driven_by(profile: Profile, angle: int, driving: list[int]) -> list[int]:
+    """Units whose jet an angle turns: those at the same place, or else the first two."""
+    place = profile.actuators[angle].position_m
+    same = [j for j in driving if profile.actuators[j].position_m == place]
+    return same or driving[:2]
+
+
+def _of_wind(profile: Profile, knots: Knots) -> list[np.ndarray]:
+    wind = apparent_flow(knots)
+    square, angle = (wind**2).sum(-1, keepdims=True), np.arctan2(wind[..., [1]], wind[..., [0]])
+    return [square * wave(k * angle) for k in (1, 2, 3) for wave in (np.cos, np.sin)]
+
+
+PRODUCTS: dict[str, Callable[[Profile, Knots], list[np.ndarray]]] = {
+    "motion": _of_motion, "controls": _of_controls, "wind": _of_wind,
+}  # fmt: skip
+
+
+def _turned(out: np.ndarray, knots: Knots) -> np.ndarray:
+    """What pulls towards a place pulls along the earth's axes: turned into the body's, in place."""
+    heading = knots.state[..., [4]]
+    north, east = out[..., 0, :].copy(), out[..., 1, :].copy()
+    out[..., 0, :], out[..., 1, :] = frames.in_body_axes(
+        north, east, np.cos(heading), np.sin(heading)
+    )
+    return out

@@ -1,0 +1,84 @@
+"""Process noise that is raised in each channel by itself: rougher weather, with nothing at work.
+
+Waves and gusts do not raise the noise of surge, sway and yaw rate alike. Were all three raised by
+one factor, whatever acts on one of them more than on the others would look like a force. So would
+noise that lasts longer than that of the nominal voyages: swell and squalls do.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize
+
+from shiplog.diagnosis.linear.linear_segments import Linear
+from shiplog.diagnosis.noise import likelihood
+from shiplog.diagnosis.noise.likelihood import ProcessNoise, Startless
+from shiplog.diagnosis.noise.remainder import RAISED, Remainder
+
+FACTORS = (1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)  # of the process noise, to start from
+
+
+@dataclass(frozen=True)
+class Left:
+    """What a hypothesis leaves of a trial, to be explained by noise.
+
+    nominal   process noise of the nominal campaign
+    weight    [S] of the segments
+    counts    as `Reference.counts`
+    """
+
+    startless: Startless
+    nominal: ProcessNoise
+    weight: np.ndarray
+    counts: float
+
+    def likelihood(self, process_noise: ProcessNoise) -> float:
+        """Log likelihood, nats, up to a constant."""
+        each, volume = self.startless.square(process_noise)
+        return -0.5 * self.counts * (float(self.weight @ each) + volume)
+
+
+def left_by(
+    linear: Linear, d: np.ndarray, nominal: ProcessNoise, weight: np.ndarray, counts: float
+) -> Left:
+    """What numbers d [C], SI, leave of a pass; weight [S] of its segments. Raises
+    np.linalg.LinAlgError where its path diverged."""
+    kept = weight > 0.0  # a segment that says nothing has no likelihood
+    linear, weight = linear.pick(kept), weight[kept]
+    # subtracted before it is squared: of products small differences of large numbers would be left
+    alone = replace(linear, e=linear.e - linear.j @ d, j=linear.j[..., :0])
+    startless = likelihood.startless(likelihood.weighed(alone, nominal), nominal)
+    return Left(startless, nominal, weight, counts)
+
+
+def by_channel(left: Left, at_one_place: Remainder | None = None) -> tuple[float, Remainder]:
+    """Log likelihood of the most probable factors of surge, sway and yaw rate and of the
+    correlation time, and these factors.
+
+    at_one_place  nominal process noise that acts at one place: it is raised, and lasts longer, with
+                  the others; None without any
+    """
+
+    def raised(factors: np.ndarray) -> Remainder:
+        surge, sway, yaw_rate, lasts = map(float, np.exp(factors))
+        found = Remainder(RAISED, channels=(surge, sway, yaw_rate), noise_lasts=lasts)
+        if at_one_place is None or at_one_place.intermittent is None:
+            return found
+        ahead, across, turning = at_one_place.intermittent
+        by, force_lasts = math.sqrt(sway * yaw_rate), lasts * at_one_place.force_lasts
+        force = (by * ahead, by * across, by * turning)
+        return replace(found, intermittent=force, force_lasts=force_lasts)
+
+    def value(factors: np.ndarray) -> float:
+        return left.likelihood(raised(factors).in_noise(left.nominal))
+
+    alike = max(FACTORS, key=lambda factor: left.likelihood(left.nominal.times(factor)))
+    first = np.append(np.full(3, math.log(alike)), 0.0)
+    found = minimize(
+        lambda at: -value(at), first, method="Nelder-Mead",
+        options={"initial_simplex": first + 0.3 * np.eye(5, 4), "xatol": 0.02, "fatol": 0.1},
+    )  # fmt: skip
+    return -float(found.fun), raised(found.x)

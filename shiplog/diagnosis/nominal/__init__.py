@@ -1,0 +1,1 @@
+"""What the nominal campaign says of a model before a trial is looked at."""

@@ -1,0 +1,243 @@
+"""What the nominal campaign alone says of model and ship; it can be kept for later trials."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shiplog.diagnosis.linear import linearisation, segment_nodes, segments
+from shiplog.diagnosis.linear.linear_segments import Linear, Path
+from shiplog.diagnosis.linear.measurement_correction import read
+from shiplog.diagnosis.linear.parameter_layout import Columns
+from shiplog.diagnosis.noise import discrepancy, likelihood, noise_estimate
+from shiplog.diagnosis.noise.campaign_parts import (
+    marginal,
+    parts_of,
+    picked,
+    products,
+    robust_weights,
+    squares,
+)
+from shiplog.diagnosis.noise.discrepancy import Discrepancy
+from shiplog.diagnosis.noise.likelihood import Modes, ProcessNoise
+from shiplog.diagnosis.nominal import campaign_prior, nominal_fit, voyage_effects
+from shiplog.diagnosis.nominal.campaign_prior import prior
+from shiplog.diagnosis.nominal.nominal_fit import Converged
+from shiplog.diagnosis.nominal.voyage_effects import VoyageEffects, reduced
+from shiplog.models.causes import Setting
+from shiplog.models.extended import Extended
+from shiplog.models.starting_values import Start
+from shiplog.voyages.rows.recording import Record
+
+LEARNING_ROUNDS = 3  # of deviations, noise and paths in turn
+NOISE_LEVELS = np.exp(np.linspace(-0.6, 0.6, 7))  # of one part, times the process noise of all
+NOISE_TIMES = (0.25, 0.5, 1.0, 2.0, 4.0)  # of the process noise, times the first guess
+
+
+@dataclass(frozen=True)
+class Characteristics:
+    """What the nominal campaign alone says of model and ship; it can be kept for later trials.
+
+    process_noise  sizes and correlation times of instrument and process noise
+    deviation   group of columns → standard deviation of one part's numbers, in their units
+    size        family of the discrepancy → prior size of its weights
+    apart       how far voyages are from each other, in those deviations
+    share       share of itself that a trial counts
+    noise       standard deviation, over the parts, of the logarithm of the process noise
+    weight      [S] of each segment
+    path        of each segment, as a trial's segments have theirs: about the discrepancy
+    """
+
+    process_noise: ProcessNoise
+    deviation: Mapping[str, float]
+    size: Mapping[str, float]
+    apart: float
+    share: float
+    noise: float
+    weight: np.ndarray
+    path: Path
+
+
+@dataclass(frozen=True)
+class NominalPass:
+    """The nominal voyages linearised once, with the discrepancy's families."""
+
+    linear: Linear
+    columns: Columns
+    held: np.ndarray
+    families: Discrepancy
+    accelerations: np.ndarray
+    rows: list[np.ndarray]
+
+
+def nominal_pass(
+    model: Extended, setting: Setting, start: Start, record: Record, at: Converged,
+    numbers: Mapping[str, np.ndarray] | None = None, pulled: bool = True,
+) -> NominalPass:  # fmt: skip
+    """`numbers` of causes that the voyages have; none but on voyages that are not nominal. Whether
+    the path has been `pulled` with them."""
+    columns = nominal_fit.columns_of(model, setting, start)
+    cut, moved, observed = read(model, setting, record, segments.begins(record), numbers)
+    whole = np.concatenate((at.theta, columns.numbers(numbers or {})))
+    g, path = segments.grid(record), at.path
+    wide = nominal_fit.wide_of(setting)
+    if not pulled:
+        path = linearisation.pulled(model, whole, cut, g, wide, path)
+    linear = linearisation.linear(model, whole, cut, g, path, moved, observed, wide)
+    held = nominal_fit.anchored(start, at.theta, columns)
+    families = discrepancy.of(
+        record.profile, at.process_noise.acceleration, len(columns.unit), discrepancy.SEEN,
+        segment_nodes.at_knots(linear.cut, g),
+    )  # fmt: skip
+    accelerations = families.accelerations(linear.cut, g)
+    columns = columns.with_misfit(families.count)
+    held = np.concatenate((held, np.zeros(families.count)))
+    return NominalPass(linear, columns, held, families, accelerations, parts_of(linear.cut.voyage))
+
+
+def characteristics(
+    model: Extended, setting: Setting, start: Start, record: Record, at: Converged,
+    numbers: Mapping[str, np.ndarray] | None = None,
+) -> Characteristics:  # fmt: skip
+    """Estimated from the nominal voyages, linearised at their converged coefficients `at`."""
+    made = nominal_pass(model, setting, start, record, at, numbers, pulled=not numbers)
+    columns, held, known = made.columns, made.held, made.columns.known
+    process_noise = noise_time(made.linear, made.accelerations, columns, held, at.process_noise)
+    groups = groups_of(model, columns, made.families)
+    sized = [family.columns for family in made.families.families]
+    weight = np.ones(len(made.linear.e))
+    for round_ in range(LEARNING_ROUNDS):
+        modes = likelihood.modes(
+            likelihood.weighed(made.linear, process_noise), process_noise
+        ).joined(made.accelerations)
+        each = products(modes, made.rows, columns.unit, weight)
+        effects = voyage_effects.learn(each, known, held, list(groups.values()), sized)
+        if round_ == LEARNING_ROUNDS - 1:
+            break
+        # what parts disagree in is no noise, nor what a few segments are off by
+        weight = _weights(modes, made, effects)
+        process_noise = _noise_of_parts(made, effects, process_noise, weight >= 1.0)
+        expected = nominal_fit.discrepancy_here(sum(each[1:], each[0]), effects.size**-2.0, columns)
+        path = _path_about(model, record, at, made, expected, process_noise, numbers)
+        at = replace(at, path=path)
+        made = nominal_pass(model, setting, start, record, at, numbers)
+    parts = [reduced(one, effects.deviation)[0] for one in each]
+    voyages = made.linear.cut.voyage[[rows[0] for rows in made.rows]]
+    apart, share = campaign_prior.learn(parts, voyages, effects, held)
+    information, pull = prior(parts, effects.size**-2.0, held, apart * effects.deviation, share)
+    return Characteristics(
+        process_noise,
+        {name: float(effects.deviation[at[0]]) for name, at in groups.items()},
+        {f.name: float(effects.size[f.columns[0]]) for f in made.families.families},
+        apart,
+        share,
+        _noise(modes, made.rows, columns, effects, information, pull, weight),
+        weight,
+        at.path,
+    )
+
+
+def _path_about(
+    model: Extended, record: Record, at: Converged, made: NominalPass, expected: np.ndarray,
+    process_noise: ProcessNoise, numbers: Mapping[str, np.ndarray] | None,
+) -> Path:  # fmt: skip
+    """The path of each segment about its model with the discrepancy, as firmly held as a trial's.
+    Nonlinear errors are then the same in both."""
+    about = made.accelerations @ expected
+    whole = np.concatenate((at.theta, made.columns.numbers(numbers or {})))
+    hold = nominal_fit.hold(process_noise, process_noise.acceleration)
+    return linearisation.pulled(
+        model, whole, made.linear.cut, segments.grid(record), hold, at.path, about=about
+    )
+
+
+def _weights(modes: Modes, made: NominalPass, effects: VoyageEffects) -> np.ndarray:
+    assert effects.numbers is not None
+    square = np.empty(len(modes.dd))
+    for rows, numbers in zip(made.rows, effects.numbers, strict=True):
+        square[rows] = squares(picked(modes, rows), numbers * made.columns.unit)
+    return robust_weights(square, ~made.linear.lost)
+
+
+def _noise_of_parts(
+    made: NominalPass, effects: VoyageEffects, process_noise: ProcessNoise, kept: np.ndarray
+) -> ProcessNoise:
+    """Noise of the residuals of the `kept` [S] segments when every part has its own numbers."""
+    assert effects.numbers is not None
+    own = np.empty((len(made.linear.e), len(made.columns.unit)))
+    for rows, numbers in zip(made.rows, effects.numbers, strict=True):
+        own[rows] = numbers * made.columns.unit
+    left = made.linear.less_numbers(own, made.accelerations).pick(kept)
+    return noise_estimate.learnt(left, np.zeros(made.columns.linearised), process_noise, rounds=3)
+
+
+def noise_time(
+    linear: Linear,
+    accelerations: np.ndarray,
+    columns: Columns,
+    held: np.ndarray,
+    process_noise: ProcessNoise,
+) -> ProcessNoise:
+    """Sizes and correlation time of the process noise that make the nominal campaign likeliest,
+    the model's discrepancy aside."""
+    best, found = -math.inf, process_noise
+    middle = NOISE_TIMES.index(1.0)
+    for way in (NOISE_TIMES[middle:], NOISE_TIMES[:middle][::-1]):
+        for factor in way:
+            tried = replace(found, time=factor * process_noise.time)
+            for _ in range(2 if factor == 1.0 else 1):
+                numbers, _ = _solved(linear, accelerations, tried, columns, held)
+                left = linear.less(accelerations @ numbers[columns.linearised :])
+                tried = noise_estimate.learnt(left, numbers[: columns.linearised], tried, rounds=2)
+            _, value = _solved(linear, accelerations, tried, columns, held)
+            if value < best:
+                break
+            best, found = value, tried
+    return found
+
+
+def _solved(
+    linear: Linear,
+    accelerations: np.ndarray,
+    process_noise: ProcessNoise,
+    columns: Columns,
+    held: np.ndarray,
+) -> tuple[np.ndarray, float]:
+    """Likeliest numbers [C], SI, and the campaign's log marginal likelihood."""
+    modes = likelihood.modes(likelihood.weighed(linear, process_noise), process_noise).joined(
+        accelerations
+    )
+    by = np.concatenate(([1.0], columns.unit))
+    total = modes.total(np.ones(len(linear.e))) * np.outer(by, by)
+    both = total[1:, 1:] + np.diag(columns.known)
+    value = marginal(total, np.diag(columns.known), held) - 0.5 * modes.log_volume()
+    return np.linalg.solve(both, total[1:, 0] + held) * columns.unit, value
+
+
+def groups_of(model: Extended, columns: Columns, families: Discrepancy) -> dict[str, np.ndarray]:
+    """Columns that share one variance: coefficients of one part of the ship, each cause's numbers,
+    each family of the discrepancy. Ship and discrepancy both have a part called wind."""
+    part = np.array([name.split(".")[0] for name in model.base.names])
+    found = {f"{name} coefficients": np.flatnonzero(part == name)
+             for name in dict.fromkeys(part.tolist())}  # fmt: skip
+    found |= {c.label: columns.of[c.label] for c in model.causes if c.varies}
+    return found | {f"{f.name} discrepancy": f.columns for f in families.families}
+
+
+def _noise(modes, rows, columns, effects, information, pull, weight) -> float:
+    """Root mean square, over the parts, of the logarithm of the process noise over its estimate for
+    the whole campaign."""
+    found = []
+    for part in rows:
+        own = picked(modes, part)
+        scores = []
+        for factor in NOISE_LEVELS:
+            gram = products(own, [np.arange(len(part))], columns.unit, weight[part], factor)[0]
+            gram, logdet = reduced(gram, effects.deviation)
+            volume = float(weight[part] @ np.log1p(factor**2 * own.felt).sum(-1)) + logdet
+            scores.append(marginal(gram, information, pull) - 0.5 * volume)
+        found.append(math.log(NOISE_LEVELS[int(np.argmax(scores))]))
+    return float(np.sqrt(np.mean(np.square(found))))

@@ -1,0 +1,219 @@
+"""The nominal campaign: its coefficients and errors, and the differences between its voyages.
+
+Coefficients, the causes' nominal numbers and the weights of the model's discrepancy are estimated
+together. The variance between its voyages and between their parts (`voyage_effects`,
+`campaign_prior`) is the variance of a trial without any change.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from shiplog.diagnosis.linear import segment_nodes, segments
+from shiplog.diagnosis.linear.linear_segments import Linear
+from shiplog.diagnosis.linear.parameter_layout import HELD_INFORMATION
+from shiplog.diagnosis.noise import discrepancy, likelihood
+from shiplog.diagnosis.noise.campaign_parts import products
+from shiplog.diagnosis.noise.discrepancy import Discrepancy
+from shiplog.diagnosis.nominal import campaign_prior, nominal_fit, nominal_reference, voyage_effects
+from shiplog.diagnosis.nominal.campaign_characteristics import (
+    Characteristics,
+    characteristics,
+    groups_of,
+    nominal_pass,
+)
+from shiplog.diagnosis.nominal.campaign_prior import prior
+from shiplog.diagnosis.nominal.nominal_fit import Converged
+from shiplog.diagnosis.nominal.nominal_reference import Reference
+from shiplog.diagnosis.nominal.voyage_effects import VoyageEffects, reduced
+from shiplog.models.causes import Setting
+from shiplog.models.compiled_network import Network
+from shiplog.models.extended import Extended
+from shiplog.models.starting_values import Start
+from shiplog.voyages.rows.recording import Record
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What a trial is compared with.
+
+    reference    the linearisation point and prior of a trial's numbers, [C] with the discrepancy's
+                 weights; `counts` is the share of itself that a trial counts
+    effects      deviation of one part's numbers from the others' [C]
+    discrepancy  its families and their columns
+    unseen       families that no model of forces has, over the nominal campaign
+    each         products of the nominal parts, in units: [1 + C, 1 + C], then the unseen families'
+    voyage       of each part; parts of a campaign of one voyage are voyages of their own
+    apart        how far voyages are from each other, in deviations of their parts
+    noise        standard deviation, over the parts, of the logarithm of the process noise
+    rows         nominal segments of each part; weight [S] of each segment
+    """
+
+    reference: Reference
+    effects: VoyageEffects
+    discrepancy: Discrepancy
+    unseen: Discrepancy
+    each: tuple[np.ndarray, ...]
+    voyage: np.ndarray
+    apart: float
+    noise: float
+    rows: tuple[np.ndarray, ...]
+    weight: np.ndarray
+
+    @cached_property
+    def parts(self) -> tuple[np.ndarray, ...]:
+        """`each` with every part's own numbers integrated out."""
+        return tuple(reduced(g, self.deviation)[0] for g in self.each)
+
+    @cached_property
+    def voyages(self) -> tuple[np.ndarray, ...]:
+        """Products of each voyage, its own numbers integrated out."""
+        return tuple(
+            campaign_prior.of_voyages(self.parts, self.voyage, self.apart * self.deviation)[0]
+        )
+
+    @property
+    def deviation(self) -> np.ndarray:
+        """Of one part's numbers, the unseen families' with them [C + W]."""
+        return np.append(self.effects.deviation, np.zeros(self.unseen.count))
+
+    def residual(self, record: Record) -> Linear | None:
+        """The nominal voyages, whose record this is, without what the campaign says and what each
+        of its parts deviates by; None where there are none of the model's own."""
+        made = self.reference
+        if made.nominal is None or made.misfit is None or not self.rows:
+            return None
+        unit = made.columns.unit
+        deviation = math.hypot(1.0, self.apart) * self.effects.deviation
+        numbers = np.zeros((len(made.nominal.e), len(unit)))
+        for gram, rows in zip(self.each, self.rows, strict=True):
+            own = voyage_effects.own_numbers(gram, made.mean, deviation)
+            numbers[rows] = (made.mean + own) * unit
+        weights = made.misfit.accelerations(made.nominal.cut, segments.grid(record))
+        return made.nominal.less_numbers(numbers, weights)
+
+    def prior_without(self, left_out: int, apart: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Information and pull of θ, one nominal voyage left out; of the numbers of a voyage that
+        is so far `apart`."""
+        known = self.effects.size**-2.0
+        count = 1 + len(known)
+        kept = [g[:count, :count] for i, g in enumerate(self.voyages) if i != left_out]
+        return prior(kept, known, self.reference.anchor, apart * self.effects.deviation,
+                     self.reference.counts)  # fmt: skip
+
+
+def learn(
+    model: Extended, setting: Setting, start: Start, record: Record, at: Converged,
+    found: Characteristics, numbers: Mapping[str, np.ndarray] | None = None,
+) -> Campaign:  # fmt: skip
+    """The campaign as a trial's causes see it, which depend on where the trial was. `numbers` as in
+    `assumed`."""
+    made = nominal_pass(model, setting, start, record, replace(at, path=found.path), numbers)
+    columns, held, families = made.columns, made.held, made.families
+    process_noise, known = found.process_noise, made.columns.known
+    modes = likelihood.modes(likelihood.weighed(made.linear, process_noise), process_noise).joined(
+        made.accelerations
+    )
+    unseen = discrepancy.of(
+        record.profile, at.process_noise.acceleration, len(columns.unit), discrepancy.UNSEEN,
+        segment_nodes.at_knots(made.linear.cut, segments.grid(record)),
+    )  # fmt: skip
+    whole = modes.joined(unseen.accelerations(made.linear.cut, segments.grid(record)))
+    unit = np.append(columns.unit, np.ones(unseen.count))
+    weight = np.where(made.linear.lost, 0.0, found.weight)
+    every = products(whole, made.rows, unit, weight)
+    deviation, size = np.zeros(len(known)), known**-0.5
+    for name, where in groups_of(model, columns, families).items():
+        deviation[where] = found.deviation.get(name, voyage_effects.UNSEEN_DEVIATION)
+    for family in families.families:
+        size[family.columns] = found.size[family.name]
+    effects = VoyageEffects(deviation, size)
+    count = 1 + len(known)
+    parts = [reduced(g[:count, :count], deviation)[0] for g in every]
+    voyage = made.linear.cut.voyage[[rows[0] for rows in made.rows]]
+    own = np.zeros(len(known))
+    if len(np.unique(voyage)) == 1:  # its parts share its deviation, which another voyage has not
+        voyage, own = np.arange(len(parts)), found.apart * deviation
+    voyages, _ = campaign_prior.of_voyages(parts, voyage, found.apart * deviation)
+    information, pull = prior(voyages, size**-2.0, held, own, found.share)
+    reference_made = Reference(
+        model, setting, at.theta, columns, process_noise, nominal_fit.wide_of(setting),
+        information, pull, held, made.linear,
+        nominal_reference.freedom(len(voyages)),
+        misfit=families,  # type: ignore[arg-type]  # it acts as a network's Misfit does
+        counts=found.share,
+    )  # fmt: skip
+    total = np.sum([g[:count, :count] for g in every], axis=0)
+    weights = nominal_fit.discrepancy_here(total, size**-2.0, columns)
+    reference_made = replace(reference_made, expected=weights)
+    return Campaign(
+        reference_made, effects, families, unseen, tuple(every), voyage, found.apart,
+        found.noise,
+        tuple(made.rows), weight,
+    )  # fmt: skip
+
+
+def widened(model: Extended, setting: Setting, start: Start) -> Start:
+    """Coefficients at least as free on the nominal voyages as any cause makes them in a trial."""
+    names = model.base.names
+    values = dict(zip(names, start.values, strict=True))
+    spread = start.spread.copy()
+    still = np.zeros(6)
+    for cause in model.causes:
+        if not cause.absorbed:
+            continue
+        for size in np.diag(cause.sizes(setting)):
+            changed = cause.coefficients(dict(values), size, still, 0.5, {})
+            for i, name in enumerate(names):
+                more = abs(float(changed.get(name, values[name])) - values[name])
+                spread[i] = max(spread[i], more)
+    return replace(start, spread=spread)
+
+
+def of_reference(made: Reference) -> Campaign:
+    """A campaign whose voyages do not differ, and whose model has no discrepancy."""
+    none = Discrepancy((), made.process_noise.acceleration)
+    effects = VoyageEffects(np.zeros(len(made.pull)), made.columns.known**-0.5)
+    return Campaign(made, effects, none, none, (), np.zeros(0), 0.0, 0.0, (), np.zeros(0))
+
+
+def assumed(
+    model: Extended, setting: Setting, start: Start, record: Record, given: bool,
+    inputs: Network | None = None, numbers: Mapping[str, np.ndarray] | None = None,
+) -> Campaign:  # fmt: skip
+    """Without a nominal campaign: the trial's own voyages take its place, and no cause has a
+    nominal size.
+
+    given    coefficients that nobody fitted, held near their values; else a fit to these voyages
+    inputs   a network that was trained on these voyages
+    numbers  of causes that were found in these voyages: what they explain is no discrepancy
+    """
+    if inputs is not None:
+        return of_reference(nominal_reference.assume(model, setting, start, record, given, inputs))
+    start = widened(model, setting, start)
+    rounds = 0 if given else nominal_fit.LINEARISATIONS
+    at = nominal_fit.converged(model, setting, start, record, rounds, discrepancy.SEEN)
+    # how parts differ is learned with coefficients as free as they plausibly are: what all parts
+    # have in common must not look like a difference
+    found = characteristics(model, setting, start, record, at, numbers)
+    whole = learn(model, setting, start, record, at, found, numbers)
+    columns, known = whole.reference.columns, whole.effects.size**-2.0
+    known[columns.base : columns.linearised] = HELD_INFORMATION
+    if given:
+        known[: columns.base] = nominal_reference.GIVEN**-2.0
+    made = replace(
+        whole.reference, information=np.diag(known), pull=known * whole.reference.anchor,
+        nominal=None, adapts=not given,
+    )  # fmt: skip
+    return replace(
+        whole,
+        reference=made,
+        effects=VoyageEffects(whole.effects.deviation, known**-0.5),
+        each=(),
+        voyage=np.zeros(0),
+    )

@@ -1,0 +1,201 @@
+"""The nominal reference: what is known of coefficients and causes before a trial.
+
+An error that the model has everywhere is part of it; the diagnosis tests changes only. What is
+fitted to some voyages is over-confident for others: their products count for 1/κ of themselves (a
+power prior, Ibrahim & Chen 2000). `nominal_campaign` makes it of the training voyages, and `assume`
+of a network that is diagnosed on these very voyages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from shiplog.diagnosis.linear import linearisation, segments
+from shiplog.diagnosis.linear.linear_segments import Linear, Wide
+from shiplog.diagnosis.linear.measurement_correction import read
+from shiplog.diagnosis.linear.parameter_layout import HELD_INFORMATION, Columns
+from shiplog.diagnosis.noise import input_misfit, likelihood
+from shiplog.diagnosis.noise.campaign_parts import marginal
+from shiplog.diagnosis.noise.input_misfit import Misfit
+from shiplog.diagnosis.noise.likelihood import ProcessNoise
+from shiplog.diagnosis.noise.remainder import Remainder
+from shiplog.diagnosis.nominal import nominal_fit
+from shiplog.diagnosis.nominal.nominal_fit import anchored, columns_of, converged, hold, wide_of
+from shiplog.models.causes import Cause, Setting, constants_of
+from shiplog.models.compiled_network import Network
+from shiplog.models.extended import Extended
+from shiplog.models.starting_values import Start
+from shiplog.voyages.rows.recording import Record
+
+KAPPAS = (2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 32.0)  # that are tried
+CAREFUL_KAPPA = 11.0  # of too few voyages, and the most by which a trial counts less
+FEWEST_VOYAGES = 3  # from which κ is estimated
+GIVEN = 0.1  # of the plausible spread, that coefficients nobody fitted are held to
+
+
+@dataclass(frozen=True)
+class Reference:
+    """θ that all is linearised about, and what the nominal campaign says around it.
+
+    information  [C, C]  and pull [C], in units of `columns.unit`; `anchor` [C] of the latter is the
+                 run's own coefficients'
+    nominal      that campaign; None where the model was trained on the very data that are diagnosed
+    freedom      degrees of freedom that the voyages leave; intervals are wider with fewer
+    adapts       whether the model has absorbed causes there, and is fitted again with them
+    misfit       the error of its MMG as a function of the network's inputs
+    counts       share of itself that a trial counts, as its voyages have errors of their own
+    expected     [W] weights of the discrepancy that a path follows; none where None
+    """
+
+    model: Extended
+    setting: Setting
+    theta: np.ndarray
+    columns: Columns
+    process_noise: ProcessNoise
+    wide: Wide
+    information: np.ndarray
+    pull: np.ndarray
+    anchor: np.ndarray
+    nominal: Linear | None
+    freedom: float
+    adapts: bool = False
+    misfit: Misfit | None = None
+    counts: float = 1.0
+    expected: np.ndarray | None = None
+
+    @cached_property
+    def mean(self) -> np.ndarray:
+        """[C] nominal numbers, in units."""
+        return np.linalg.solve(self.information, self.pull)
+
+    @cached_property
+    def information_volume(self) -> float:
+        """log|information|."""
+        return float(np.linalg.slogdet(self.information)[1])
+
+    def apart(self, one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]) -> float:
+        """The most that a number differs, in units of its size; of the same causes."""
+        columns = self.columns
+        return max(
+            (float(np.abs((one[n] - other[n]) / columns.unit[columns.of[n]]).max()) for n in one),
+            default=0.0,
+        )
+
+    def about(self, cut: segments.Cut, g: segments.SegmentGrid) -> np.ndarray | None:
+        """Acceleration [S, 3J] that is expected at a path's knots: that of the discrepancy. A path
+        that had to do without would be off by more than the process noise, and what is not linear
+        in that would look like a change."""
+        if self.expected is None or self.misfit is None:
+            return None
+        return self.misfit.accelerations(cut, g) @ self.expected
+
+    def held(self, noise_factor: float, remainder: Remainder) -> Wide:
+        """Allowed distance of a path where the process noise has this factor, with a remainder."""
+        of = remainder.in_noise(self.process_noise)
+        acceleration = noise_factor * of.acceleration
+        if of.intermittent is not None:
+            acceleration = np.hypot(acceleration, of.intermittent)
+        return hold(self.process_noise, acceleration)
+
+    @property
+    def coefficients(self) -> dict[str, np.ndarray]:
+        """Of the ship's MMG, by name: the base's own, or those that stand in for a network's."""
+        values = self.theta if self.model.own else np.asarray(self.model.stand_in_values)
+        return dict(zip(self.model.stand_in.names, values, strict=True))
+
+
+def freedom(voyages: int) -> float:
+    """Degrees of it that so many voyages leave to what they have in common."""
+    return float(max(voyages - 1, 2))
+
+
+def nominal_information(
+    total: np.ndarray, kappa: float, known: np.ndarray, held: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Information [C, C] and pull [C] of a campaign's products [1 + C, 1 + C], which count for 1/κ
+    together with what is `known` and `held` without them."""
+    return total[1:, 1:] / kappa + np.diag(known), total[1:, 0] / kappa + held
+
+
+def inflation(each: np.ndarray, known: np.ndarray, held: np.ndarray) -> float:
+    """κ that predicts each voyage best from the others; careful with too few.
+
+    each [V, 1 + C, 1 + C] products of a voyage; what is known before any data, information and
+    pull, `known` and `held` [C]: all in units
+    """
+    if len(each) < FEWEST_VOYAGES:
+        return CAREFUL_KAPPA
+    total = each.sum(0)
+    scores = []
+    for kappa in KAPPAS:
+        score = 0.0
+        for left in each:
+            score += marginal(left, *nominal_information(total - left, kappa, known, held))
+        scores.append(score)
+    return KAPPAS[int(np.argmax(scores))]
+
+
+def assume(
+    model: Extended, setting: Setting, start: Start, record: Record, given: bool, inputs: Network
+) -> Reference:
+    """Of a network without a nominal campaign: noise, discrepancy and κ are estimated from these
+    voyages, and coefficients have their plausible spread.
+
+    given    published coefficients, with a tenth of that spread, and not fitted to these voyages
+    inputs   the network that trained on these voyages: the discrepancy is a function of its inputs
+    """
+    if given:
+        start = replace(start, spread=GIVEN * start.spread)
+    at = converged(model, setting, start, record, rounds=0 if given else nominal_fit.LINEARISATIONS)
+    columns = columns_of(model, setting, start)
+    cut, moved, observed = read(model, setting, record, segments.begins(record))
+    whole = np.concatenate((at.theta, np.zeros(len(columns.unit) - columns.base)))
+    g = segments.grid(record)
+    linear = linearisation.linear(model, whole, cut, g, at.path, moved, observed)
+    modes = likelihood.modes(likelihood.weighed(linear, at.process_noise), at.process_noise)
+    wrong = input_misfit.of(
+        inputs, linear.cut, g, modes, columns.known, columns.unit, at.process_noise.acceleration
+    )  # fmt: skip
+    held = np.append(anchored(start, at.theta, columns), np.zeros(wrong.count))
+    columns = columns.with_misfit(wrong.count)
+    modes = modes.joined(wrong.accelerations(linear.cut, g))
+    names = np.unique(linear.cut.voyage)
+    by = np.concatenate(([1.0], columns.unit))
+    each = [modes.total((linear.cut.voyage == v).astype(float)) for v in names]
+    kappa = inflation(np.stack(each) * np.outer(by, by), columns.known, held)
+    # without a nominal campaign no cause has a nominal size
+    known = columns.known.copy()
+    known[columns.base : columns.linearised] = HELD_INFORMATION
+    return Reference(
+        model, setting, at.theta, columns, at.process_noise, wide_of(setting), np.diag(known),
+        held, held, None, freedom(len(names)), adapts=not given, misfit=wrong,
+        counts=1.0 / min(kappa, CAREFUL_KAPPA),
+    )  # fmt: skip
+
+
+def with_causes(reference: Reference, causes: Sequence[Cause]) -> Reference:
+    """One that `assume` made, with these causes in its model and no others."""
+    setting, columns = reference.setting, reference.columns
+    sizes = [cause.sizes(setting) for cause in causes]
+    first, last = columns.base, columns.linearised
+    more = sum(len(size) for size in sizes)
+
+    def widened(values: np.ndarray, own: float) -> np.ndarray:
+        return np.concatenate((values[:first], np.full(more, own), values[last:]))
+
+    constants = {**constants_of(causes, setting), **reference.model.constants}
+    return replace(
+        reference,
+        model=replace(reference.model, causes=tuple(causes), constants=constants),
+        columns=Columns(
+            first, tuple(causes),
+            np.concatenate((columns.unit[:first], *sizes, columns.unit[last:])), columns.misfit,
+        ),
+        information=np.diag(widened(np.diag(reference.information), HELD_INFORMATION)),
+        pull=widened(reference.pull, 0.0),
+        anchor=widened(reference.anchor, 0.0),
+    )  # fmt: skip

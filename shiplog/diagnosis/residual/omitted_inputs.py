@@ -1,0 +1,304 @@
+"""Dependence of the residual on inputs that the model does not have.
+
+The inputs of a model are velocities, actuators and apparent wind. Heading, place, time and recent
+changes of the controls are not. If they predict the residual on held-out voyages, a term is missing
+that a new fit of the model cannot provide.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+import polars as pl
+
+from shiplog.diagnosis.noise.residual_acceleration import ACCELERATIONS
+from shiplog.nomenclature import channels
+from shiplog.ship_profile.profile import Profile
+from shiplog.voyages.rows.timescale import KNOT
+
+CHANNELS = tuple(c.name for c in channels.VELOCITY)
+LEAST_R2 = 0.05  # of the variance: what a model misfits itself reaches half of it in another season
+BEYOND = 4.0  # standard deviations of what chance reaches
+SHIFTS = 20
+LEAST_SHIFT = 30  # nodes, the least shift: random forces are no longer correlated by then
+EXCHANGED_S = 300.0  # s, exchanged to make time mean nothing
+VOYAGE_FOLDS = 8  # more voyages are left out in groups
+MAP_CENTRES = 12
+OUTLIER = 6.0  # robust standard deviations; a ship that was pushed by hand must not decide
+PENALTIES = 10.0 ** np.arange(-4.0, 2.0)  # of the mean square of a feature
+
+
+@dataclass(frozen=True, slots=True)
+class Dependence:
+    """How far one omitted input predicts the residual acceleration.
+
+    r2      share of the variance of each channel, on voyages left out; below 0: worse than none
+    folds   what was left out in turn: "voyages", "groups of voyages" or "halves" of the only one
+    """
+
+    variable: str  # a family of the contract: heading, position, time or controls
+    r2: tuple[float, float, float]  # surge, sway, yaw_rate
+    acts_on: tuple[str, ...]
+    folds: str
+
+    @property
+    def significant(self) -> bool:
+        return bool(self.acts_on)
+
+
+@dataclass(frozen=True)
+class _Knots:
+    """What the regressions share, K knots in order of voyage and time.
+
+    y        [K, 3]  accelerations, outliers cut
+    visible  [K, G]  a rough model's features of all inputs of the model
+    carried  [K, H]  what a missing effect may be proportional to
+    runs     [K]     voyage
+    folds    [K]     the group that is held out together
+    """
+
+    y: np.ndarray
+    visible: np.ndarray
+    carried: np.ndarray
+    runs: np.ndarray
+    folds: np.ndarray
+
+
+Indices = np.ndarray  # [K] which knot's unseen variable goes with each knot
+
+
+def table(
+    knots: pl.DataFrame,
+    profile: Profile,
+    rng: np.random.Generator,
+    shifts: int = SHIFTS,
+    knot: float = KNOT,
+) -> tuple[Dependence, ...]:
+    """One row each for heading, position, time and controls.
+
+    knots   of `residual_acceleration.table`, or the same columns of any other model's residual
+    rng     draws the shifts
+    knot    s between knots
+
+    R² is beyond what a regression on the model's inputs predicts; that of position also beyond
+    heading, or every steady force would count as a matter of place.
+    """
+    shared, folds = _knots(knots, profile)
+    psi = knots["heading"].to_numpy()
+    heading = _heading(psi, shared.carried)
+    designs: dict[str, tuple[Callable[[Indices], np.ndarray], np.ndarray]] = {
+        "heading": (heading, shared.visible),
+        "position": (
+            _position(knots.select("x0", "y0").to_numpy(), psi),
+            np.concatenate((shared.visible, heading(np.arange(len(psi)))), 1),
+        ),
+        "time": (_time(knots["share"].to_numpy(), shared.carried), shared.visible),
+        "controls": (_controls(knots, profile, shared, knot), shared.visible),
+    }
+    time = knots["time_s"].to_numpy()
+    found = []
+    for variable, (features, known) in designs.items():
+        move = _exchanged if variable == "time" else _shifted
+        r2 = _gains(shared, known, [features(np.arange(len(time)))])[0]
+        null = _gains(
+            shared, known, [features(move(shared.runs, time, rng)) for _ in range(shifts)]
+        )
+        lucky = np.maximum(null, 0.0)  # how much worse than nothing a bad guess is does not count
+        limit = np.maximum(lucky.max(0), lucky.mean(0) + BEYOND * lucky.std(0))
+        acts_on = tuple(
+            c for c, a, b in zip(CHANNELS, r2, np.maximum(limit, LEAST_R2), strict=True) if a > b
+        )
+        found.append(Dependence(variable, _three(r2), acts_on, folds))
+    return tuple(found)
+
+
+def _three(values: np.ndarray) -> tuple[float, float, float]:
+    return float(values[0]), float(values[1]), float(values[2])
+
+
+def _knots(knots: pl.DataFrame, profile: Profile) -> tuple[_Knots, str]:
+    y = knots.select(ACCELERATIONS).to_numpy()
+    middle = np.median(y, axis=0)
+    reach = OUTLIER * 1.4826 * np.median(np.abs(y - middle), axis=0)
+    runs = knots["voyage"].rle_id().to_numpy().astype(int)
+    motion = _unit(knots.select(CHANNELS).to_numpy())
+    blown = knots.select("wind_ahead", "wind_starboard").to_numpy()
+    blown = _unit(blown * np.linalg.norm(blown, axis=1, keepdims=True))
+    drive = _drive(knots, profile)
+    u, v, r = motion.T
+    visible = np.concatenate(
+        (motion, motion * np.abs(motion), np.stack((u * v, u * r, v * r), 1), blown, drive), 1
+    )
+    carried = np.concatenate((np.ones((len(y), 1)), motion, drive), 1)
+    folds, name = _folds(runs)
+    return _Knots(np.clip(y, middle - reach, middle + reach), visible, carried, runs, folds), name
+
+
+def _drive(knots: pl.DataFrame, profile: Profile) -> np.ndarray:
+    """[K, D]: thrust of each screw as n|n|, and all of it turned by each angle."""
+    values = {a.name: knots[a.name].to_numpy() for a in profile.actuators}
+    strengths = [
+        values[a.name] * np.abs(values[a.name])
+        for a in profile.actuators
+        if a.kind in ("propeller", "thruster")
+    ]
+    angles = [values[a.name] for a in profile.actuators if a.kind in ("rudder", "azimuth")]
+    strength = _unit(np.stack(strengths or [np.ones(knots.height)], 1))
+    total = strength.sum(1)
+    turned = [total * turn(angle) for angle in angles for turn in (np.sin, np.cos)]
+    return np.concatenate((strength, np.stack(turned, 1) if turned else strength[:, :0]), 1)
+
+
+def _folds(runs: np.ndarray) -> tuple[np.ndarray, str]:
+    """[K] the fold of each: voyages, groups of them in order, or halves of one."""
+    count = int(runs.max()) + 1
+    if count == 1:
+        return (np.arange(len(runs)) >= len(runs) // 2).astype(int), "halves"
+    if count <= VOYAGE_FOLDS:
+        return runs, "voyages"
+    ends = np.cumsum(np.bincount(runs)) - 1
+    group = np.unique(ends * VOYAGE_FOLDS // len(runs), return_inverse=True)[1]
+    return group[runs], "groups of voyages"
+
+
+def _unit(values: np.ndarray) -> np.ndarray:
+    """Columns over their root mean square; a column of zeros stays."""
+    return values / np.maximum(np.sqrt((values**2).mean(0)), 1e-12)
+
+
+def _times(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Every column of one with every column of the other, [K, L R]."""
+    return (left[:, :, None] * right[:, None, :]).reshape(len(left), -1)
+
+
+# --- features of the unseen variables, as at knot i for knot k ------------------------------------
+
+
+def _heading(psi: np.ndarray, carried: np.ndarray) -> Callable[[Indices], np.ndarray]:
+    """Harmonics; and the first one, that of an earth-fixed vector, with what carries it."""
+    harmonics = np.stack([turn(k * psi) for k in (1, 2, 3) for turn in (np.cos, np.sin)], 1)
+
+    def features(at: Indices) -> np.ndarray:
+        turned = harmonics[at]
+        return np.concatenate((turned, _times(turned[:, :2], carried[:, 1:])), 1)
+
+    return features
+
+
+def _position(place: np.ndarray, psi: np.ndarray) -> Callable[[Indices], np.ndarray]:
+    """Bumps over the places it was at: forces in body axes, and earth-fixed ones turned there."""
+    centres = [place.mean(0)]
+    for _ in range(MAP_CENTRES - 1):  # each as far as can be from those before
+        away = np.min([((place - c) ** 2).sum(1) for c in centres], axis=0)
+        centres.append(place[away.argmax()])
+    grid = np.array(centres)
+    between = np.linalg.norm(grid[:, None] - grid, axis=-1) + np.diag(np.full(MAP_CENTRES, np.inf))
+    width = max(float(np.median(between.min(0))), 1e-6)
+    bumps = np.exp(-0.5 * ((place[:, None] - grid) ** 2).sum(-1) / width**2)
+    axes = np.stack((np.ones(len(psi)), np.cos(psi), np.sin(psi)), 1)
+    return lambda at: _times(bumps[at], axes)
+
+
+def _time(share: np.ndarray, carried: np.ndarray) -> Callable[[Indices], np.ndarray]:
+    t = 2.0 * share - 1.0
+    powers = np.stack((t, t**2), 1)
+    return lambda at: _times(powers[at], carried)
+
+
+def _controls(
+    knots: pl.DataFrame, profile: Profile, shared: _Knots, knot: float
+) -> Callable[[Indices], np.ndarray]:
+    """What each actuator did over the last knot; nothing where a stretch begins."""
+    values = knots.select(profile.actuator_names).to_numpy()
+    step = np.diff(knots["time_s"].to_numpy(), prepend=-np.inf)
+    follows = (np.diff(shared.runs, prepend=-1) == 0) & (step < 1.5 * knot)
+    change = _unit(np.where(follows[:, None], np.diff(values, axis=0, prepend=values[:1]), 0.0))
+    return lambda at: _times(change[at], shared.carried)
+
+
+def _shifted(runs: np.ndarray, time: np.ndarray, rng: np.random.Generator) -> Indices:
+    """Round and round within each voyage, by LEAST_SHIFT at least."""
+    moved = np.arange(len(runs))
+    for run in np.unique(runs):
+        rows = np.flatnonzero(runs == run)
+        least = min(LEAST_SHIFT, len(rows) // 2)
+        moved[rows] = np.roll(rows, rng.integers(least, len(rows) - least + 1))
+    return moved
+
+
+def _exchanged(runs: np.ndarray, time: np.ndarray, rng: np.random.Generator) -> Indices:
+    """Pieces of the campaign in another order: within a voyage the campaign hardly ages."""
+    begins = (np.diff(runs, prepend=-1) != 0) | (np.diff(time // EXCHANGED_S, prepend=-1.0) != 0)
+    pieces = np.split(np.arange(len(runs)), np.flatnonzero(begins)[1:])
+    return np.concatenate([pieces[i] for i in rng.permutation(len(pieces))])
+
+
+# --- ridge regression on sums, voyages left out ---------------------------------------------------
+
+
+def _gains(shared: _Knots, known: np.ndarray, designs: list[np.ndarray]) -> np.ndarray:
+    """[D, 3] share of the variance that each design predicts beyond `known`."""
+    whole = np.zeros((len(shared.y), 0))
+    total, before = (_left_out(shared, x) for x in (whole, known))
+    after = np.stack([_left_out(shared, np.concatenate((known, x), 1)) for x in designs])
+    # relative to the better guess without it: a share of the remaining variance
+    base = np.minimum(before, total)
+    return (base - after) / np.maximum(base, 1e-300)
+
+
+def _left_out(shared: _Knots, features: np.ndarray) -> np.ndarray:
+    """[3] squared error on each fold in turn, the penalty chosen among the other folds."""
+    x = np.concatenate((np.ones((len(features), 1)), _unit(features), shared.y), 1)
+    count = int(shared.folds.max()) + 1
+    sums = np.stack([_square(x[shared.folds == fold]) for fold in range(count)])
+    whole = sums.sum(0)
+    weights, mean = _ridge(whole - sums)
+    errors = _errors(sums, weights, mean)  # [F, L, 3]
+    judged = np.zeros_like(errors)
+    if count > 2:
+        pairs = np.array(list(combinations(range(count), 2)))
+        weights, mean = _ridge(whole - sums[pairs[:, 0]] - sums[pairs[:, 1]])
+        for out, inner in ((0, 1), (1, 0)):
+            np.add.at(judged, pairs[:, out], _errors(sums[pairs[:, inner]], weights, mean))
+    else:  # one fold to choose by: its own halves
+        for fold in range(count):
+            rows = x[shared.folds != fold]
+            half = np.stack([_square(part) for part in np.array_split(rows, 2)])
+            judged[fold] = _errors(half, *_ridge(half[::-1])).sum(0)
+    best = judged.argmin(1)
+    return np.take_along_axis(errors, best[:, None], 1)[:, 0].sum(0)
+
+
+def _square(rows: np.ndarray) -> np.ndarray:
+    return rows.T @ rows
+
+
+def _centred(sums: np.ndarray, mean: np.ndarray) -> np.ndarray:
+    """Sums of squares [..., P + 3, P + 3] about a mean that need not be their own."""
+    count, total = sums[..., :1, :1], sums[..., 0, 1:]
+    cross = total[..., :, None] * mean[..., None, :]
+    about = count * mean[..., :, None] * mean[..., None, :]
+    return sums[..., 1:, 1:] - cross - np.swapaxes(cross, -1, -2) + about
+
+
+def _ridge(sums: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Weights [T, L, P, 3] for each penalty, and the means [T, P + 3] they are about."""
+    count = sums[..., 0, 0]
+    mean = sums[..., 0, 1:] / count[..., None]
+    inner = _centred(sums, mean)
+    features, pull = inner[..., :-3, :-3], inner[..., :-3, -3:]
+    firm = PENALTIES[:, None, None] * count[:, None, None, None] * np.eye(features.shape[-1])
+    return np.linalg.solve(features[:, None] + firm, pull[:, None]), mean
+
+
+def _errors(sums: np.ndarray, weights: np.ndarray, mean: np.ndarray) -> np.ndarray:
+    """[T, L, 3] squared errors on other rows, of which `sums` are known."""
+    inner = _centred(sums, mean)
+    features, across = inner[:, None, :-3, :-3], inner[:, None, :-3, -3:]
+    own = np.diagonal(inner[..., -3:, -3:], axis1=-2, axis2=-1)
+    return (
+        own[:, None] - 2.0 * (weights * across).sum(-2) + (weights * (features @ weights)).sum(-2)
+    )

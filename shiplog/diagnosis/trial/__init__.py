@@ -1,0 +1,1 @@
+"""A trial and what its hypotheses share."""

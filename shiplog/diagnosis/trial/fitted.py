@@ -1,0 +1,102 @@
+"""What a fit of a hypothesis gives: where a trial was linearised, numbers, evidence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from shiplog.diagnosis.linear.linear_segments import Linear, Path
+from shiplog.diagnosis.noise.likelihood import Weighed
+from shiplog.diagnosis.noise.remainder import Remainder
+
+
+@dataclass(frozen=True)
+class Found:
+    """One hypothesis.
+
+    evidence       of a base hypothesis its log marginal likelihood [nats]; of a candidate or a
+                   structure its log Bayes factor over the base hypothesis
+    noise_factor   λ, the most probable factor of the process noise
+    numbers        of each cause, as a change from nominal, with their covariance
+    density        of a base hypothesis the log density of the data and of the numbers where it was
+                   linearised
+    expected       of a candidate: the log Bayes factor to expect of it, by its size
+    """
+
+    name: str
+    evidence: float
+    noise_factor: float
+    numbers: Mapping[str, np.ndarray] = field(default_factory=dict)
+    covariance: np.ndarray | None = None
+    expected: ExpectedEvidence | None = None
+    density: float = -np.inf
+
+
+@dataclass(frozen=True)
+class ExpectedEvidence:
+    """Expected log Bayes factor of a cause: ½ Σ each s² - cost, for numbers s in units of their
+    realistic size."""
+
+    each: np.ndarray
+    cost: float
+
+    def least(self, nats: float) -> np.ndarray:
+        """Of each number alone, the size with this expected log Bayes factor [realistic sizes]."""
+        return np.sqrt(2.0 * (nats + self.cost) / np.maximum(self.each, 1e-12))
+
+    def together(self, nats: float) -> float:
+        """The size with this expected log Bayes factor, if all its numbers have that size."""
+        return float(np.sqrt(2.0 * (nats + self.cost) / max(self.each.sum(), 1e-12)))
+
+
+@dataclass(frozen=True)
+class Point:
+    """A trial linearised where some causes' numbers stand."""
+
+    numbers: Mapping[str, np.ndarray]
+    path: Path
+    linear: Linear
+    weighed: Weighed
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A hypothesis with the trial linearised where it was found, and what remains with it."""
+
+    point: Point
+    found: Found
+    remainder: Remainder
+
+    @property
+    def included(self) -> tuple[str, ...]:
+        """Labels of the causes that it holds, those of the model with them."""
+        return tuple(self.found.numbers)
+
+    @property
+    def diverged(self) -> bool:
+        """Whether it has no evidence: its numbers are then of no use."""
+        return not math.isfinite(self.found.evidence)
+
+    @property
+    def noise_factor(self) -> float:
+        """Of the process noise on its nominal one, a geometric mean over the channels."""
+        return self.remainder.overall(self.found.noise_factor)
+
+
+@dataclass(frozen=True)
+class Level:
+    """One λ: the trial's products in units, robustly weighted, and the base hypothesis' solution.
+
+    The base hypothesis holds N numbers: all nominal ones, then those of the included causes, then
+    the weights of its remainder's family.
+    """
+
+    noise_factor: float
+    gram: np.ndarray  # [1 + N, 1 + N] products of [e | J]
+    inverse: np.ndarray  # [N, N] of information and data together
+    solution: np.ndarray  # [N]
+    value: float  # log evidence of the base
+    share: float = 0.0  # of it, what the bounds of numbers add

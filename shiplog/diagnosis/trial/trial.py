@@ -1,0 +1,237 @@
+"""A trial: the segments of the voyages in question, linearised where a hypothesis stands.
+
+A hypothesis is a set of causes and one kind of remainder. Its columns join those of the campaign: a
+cause's numbers as a change from nominal, or a family of the discrepancy as a change of its weights.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+
+from shiplog.diagnosis.linear import linearisation, segment_nodes, segments
+from shiplog.diagnosis.linear.linear_segments import Linear, Path
+from shiplog.diagnosis.linear.measurement_correction import as_hypothesised, read
+from shiplog.diagnosis.linear.segments import SegmentGrid
+from shiplog.diagnosis.noise import discrepancy, likelihood, residual_acceleration
+from shiplog.diagnosis.noise.campaign_parts import PART, parts_of
+from shiplog.diagnosis.noise.discrepancy import Discrepancy
+from shiplog.diagnosis.noise.likelihood import ProcessNoise
+from shiplog.diagnosis.noise.remainder import LEAST_SPREAD, Remainder
+from shiplog.diagnosis.nominal.nominal_campaign import Campaign
+from shiplog.diagnosis.nominal.nominal_reference import Reference
+from shiplog.diagnosis.trial.fitted import Point
+from shiplog.diagnosis.trial.trial_products import Products
+from shiplog.models.causes import Cause
+from shiplog.voyages.rows.recording import Record
+
+Read = tuple[segments.Cut, np.ndarray, np.ndarray]  # see `measurement_correction.read`
+Numbers = Mapping[str, np.ndarray]
+
+
+class Readings:
+    """A trial as read with the sensors' causes put right: as it is, and as it was last."""
+
+    def __init__(self) -> None:
+        self._known: list[tuple[Numbers, Read]] = []
+
+    def of(self, reference: Reference, record: Record, rows: np.ndarray, numbers: Numbers) -> Read:
+        """The segments as read with these numbers, and the effects of all of them on the inputs
+        and size of the discrepancy."""
+        cut, moved, observed = self._read(reference, record, rows, numbers)
+        return as_hypothesised(cut, reference.model.causes, numbers), moved, observed
+
+    def _read(
+        self, reference: Reference, record: Record, rows: np.ndarray, numbers: Numbers
+    ) -> Read:
+        """The segments as read with those of these numbers that change what is read.
+
+        The effect of a sensor's cause depends on the corrections before it. With a clock that is
+        one second late, the antenna's columns are one second late too, and two clocks would seem to
+        disagree. Columns at nearby numbers are no substitute. Those of several clocks differ by
+        noise, and a sum of them would fit the noise of the data.
+        """
+        reading = {
+            c.label: np.asarray(numbers[c.label])
+            for c in reference.model.causes
+            if c.reads and c.label in numbers
+        }
+        for before, found in self._known:
+            if before.keys() == reading.keys() and reference.apart(before, reading) == 0.0:
+                return found
+        found = read(reference.model, reference.setting, record, rows, dict(reading))
+        self._known = [*self._known[:1], (reading, found)]
+        return found
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Voyages in question, against a campaign.
+
+    fixed     labels of causes that the model has already, with numbers that stay
+    parts     rows of the segments [S] of each part; voyage of each part
+    unseen    families that no model of forces has, over the trial
+    weight    [S] for how much a segment counts; nothing, where the model diverges on it
+    first     where it was linearised first; None before that
+    begun     whether it is known where the model itself diverges
+    products  of the points at which it was linearised
+    readings  of the record
+    converged  causes and remainder → numbers, path and λ at which a fit of them converged
+    """
+
+    campaign: Campaign
+    record: Record
+    fixed: tuple[str, ...]
+    grid: SegmentGrid
+    rows: np.ndarray
+    parts: tuple[np.ndarray, ...]
+    voyage: np.ndarray
+    unseen: Discrepancy
+    weight: np.ndarray
+    products: Products
+    first: Point | None = None
+    begun: bool = False
+    readings: Readings = field(default_factory=Readings)
+    converged: dict[tuple[tuple[str, ...], Remainder], tuple[Numbers, Path, float]] = field(
+        default_factory=dict
+    )
+
+    @classmethod
+    def of(
+        cls, campaign: Campaign, record: Record, fixed: Sequence[str] = (), **more: object
+    ) -> Self:
+        grid, rows = segments.grid(record), segments.begins(record)
+        reference = campaign.reference
+        knots = segment_nodes.at_knots(segments.cut(record, rows), grid)
+        known = len(reference.columns.unit)
+        unseen = discrepancy.of(
+            record.profile, reference.process_noise.acceleration, known, discrepancy.UNSEEN, knots
+        )
+        # as long as those from which the campaign knows how far parts differ
+        longest = max((len(part) for part in campaign.rows), default=PART)
+        parts = tuple(parts_of(record.voyage[rows], longest, fewest=1))
+        voyage = record.voyage[rows[[part[0] for part in parts]]]
+        products = Products(campaign, unseen, grid, parts, voyage)
+        weight = np.ones(len(rows))
+        return cls(campaign, record, tuple(fixed), grid, rows, parts, voyage, unseen, weight,
+                   products, **more)  # type: ignore[arg-type]  # fmt: skip
+
+    @property
+    def reference(self) -> Reference:
+        return self.campaign.reference
+
+    @cached_property
+    def families(self) -> dict[str, np.ndarray]:
+        """Family of the discrepancy → its columns."""
+        both = (*self.campaign.discrepancy.families, *self.unseen.families)
+        return {family.name: family.columns for family in both}
+
+    @property
+    def nominal_spread(self) -> float:
+        """Standard deviation of the logarithm of the process noise from campaign to campaign."""
+        return max(self.campaign.noise, LEAST_SPREAD)
+
+    def bounds(self, label: str) -> tuple[np.ndarray, np.ndarray]:
+        """Least and greatest numbers [Q] of a cause, SI."""
+        return self._cause(label).bounds(self.reference.setting)
+
+    def farthest(self, label: str) -> float:
+        """As `Cause.farthest` of this ship."""
+        return self._cause(label).farthest(self.reference.setting)
+
+    def clipped(self, numbers: Numbers) -> Numbers:
+        """These numbers, each moment clipped to the largest that its force or mass can make."""
+        found = dict(numbers)
+        for label, values in numbers.items():
+            farthest = self.farthest(label)
+            if math.isfinite(farthest):
+                most = farthest * abs(values[0])
+                found[label] = np.append(values[:1], np.clip(values[1:], -most, most))
+        return found
+
+    def _cause(self, label: str) -> Cause:
+        (cause,) = (c for c in self.reference.model.causes if c.label == label)
+        return cause
+
+    def process_noise(self, remainder: Remainder, cut: segments.Cut | None = None) -> ProcessNoise:
+        """The nominal one; with an intermittent force in it, where one remains. Of the trial's own
+        segments, or of others."""
+        rows = segment_nodes.rows_at_knots(self.rows if cut is None else cut.rows, self.grid)
+        return remainder.in_noise(self.reference.process_noise, rows)
+
+    def at(
+        self,
+        numbers: Numbers,
+        near: Path | Point | None = None,
+        noise_factor: float | None = None,
+        remainder: Remainder | None = None,
+    ) -> Point:
+        """The trial linearised with these numbers, about a path fitted to the measurement.
+
+        near          a path to start from, or a point whose linearisation predicts the path
+        noise_factor  λ that limits the path. A path that follows every wave of the noise is as far
+                      from the likely one as a free rollout; its nonlinearity imitates evidence
+        remainder     whose process noise and intermittent force the path may follow
+
+        Raises np.linalg.LinAlgError where the model diverges with these numbers only: this
+        hypothesis then fails.
+        """
+        ref = self.reference
+        wide = ref.wide
+        if noise_factor is not None:
+            wide = ref.held(noise_factor, remainder or Remainder())
+        cut, moved, observed = self.readings.of(ref, self.record, self.rows, numbers)
+        whole = np.concatenate((ref.theta, ref.columns.numbers(dict(numbers))))
+        about = ref.about(cut, self.grid)
+        if isinstance(near, Point):
+            stood = np.concatenate((ref.theta, ref.columns.numbers(dict(near.numbers))))
+            path = linearisation.ahead(near.linear, whole - stood, wide, about)
+        else:
+            rounds = 1 if near else linearisation.MOST_PULLS
+            path = linearisation.pulled(ref.model, whole, cut, self.grid, wide, near, rounds, about)
+        linear = linearisation.linear(
+            ref.model, whole, cut, self.grid, path, moved, observed, ref.wide
+        )
+        return self._judged(
+            Point(numbers, path, linear, likelihood.weighed(linear, ref.process_noise))
+        )
+
+    def _judged(self, point: Point) -> Point:
+        if self.begun and (point.linear.lost & (self.weight > 0.0)).any():
+            raise np.linalg.LinAlgError("the model diverges with these numbers")
+        return point
+
+    def covering(self, point: Point) -> Linear:
+        """The point's segments and those between them: residuals of the same accuracy
+        everywhere."""
+        ref = self.reference
+        rows = np.setdiff1d(residual_acceleration.covering(self.record), self.rows)
+        if not len(rows):  # every stretch is one segment long, to the row
+            return point.linear
+        numbers = dict(point.numbers)
+        cut, moved, observed = read(ref.model, ref.setting, self.record, rows, numbers)
+        whole = np.concatenate((ref.theta, ref.columns.numbers(numbers)))
+        path = linearisation.pulled(
+            ref.model, whole, cut, self.grid, ref.wide, about=ref.about(cut, self.grid)
+        )
+        between = linearisation.linear(
+            ref.model, whole, cut, self.grid, path, moved, observed, ref.wide
+        )
+        return point.linear.joined(between)
+
+    def left(self, linear: Linear, d: np.ndarray) -> tuple[Linear, np.ndarray]:
+        """A pass of the trial without what the misfit's weights among the numbers d [C] do, and
+        the numbers of its own columns."""
+        misfit, count = self.reference.misfit, self.reference.columns.linearised
+        if misfit is not None:
+            linear = linear.less(misfit.accelerations(linear.cut, self.grid) @ d[count:])
+        return linear, d[:count]
+
+    def leaving_out(self, segments_out: np.ndarray) -> Self:
+        """The same with segments [S] bool that no hypothesis is judged on."""
+        return replace(self, weight=np.where(segments_out, 0.0, self.weight))

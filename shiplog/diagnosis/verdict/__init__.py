@@ -1,0 +1,1 @@
+"""From posterior to decision: posterior, refutation by held-out voyages, conventions."""

@@ -1,0 +1,205 @@
+"""The verdict of a posterior, as the report and the refutation take it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from shiplog.diagnosis import thresholds
+from shiplog.diagnosis.hypotheses import fits
+from shiplog.diagnosis.hypotheses.hypothesis import Hypothesis, form_error_of, name_of
+from shiplog.diagnosis.hypotheses.search import Search
+from shiplog.diagnosis.hypotheses.table import Hypotheses
+from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
+from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, Remainder
+from shiplog.diagnosis.trial.fitted import Fit
+from shiplog.diagnosis.verdict import posterior as posteriors
+from shiplog.diagnosis.verdict.posterior import FAMILY, STOCHASTIC, Posterior
+from shiplog.diagnosis.verdict.result import (
+    EXPLAIN_MORE,
+    PATTERN,
+    REFUTED,
+    Decision,
+    Named,
+    Structure,
+)
+
+# A cause that is at most 100 times less probable than a named one may stand in its place.
+INSTEAD_NATS = -2.0 * math.log(1.0 - thresholds.STATED)
+MOST_REASONS = 8  # of the likeliest causes by themselves that are not named
+EVERYWHERE = ("surge", "sway", "yaw_rate")
+
+
+def decide(
+    search: Search,
+    refuted: Mapping[str, str] | None = None,
+    doubted: Mapping[str, str] | None = None,
+) -> tuple[Decision, Posterior]:
+    """The verdict of the hypotheses that are not banned.
+
+    refuted   name → why held-out voyages refute it; its hypotheses are banned already
+    doubted   name → why it is not named, whatever its probability; with any, nothing is named
+    """
+    refuted, table = dict(refuted or {}), search.table
+    found = posteriors.posterior(search)
+    names = () if doubted else found.stated
+    kind = found.remainder
+    best = posteriors.best_with(found, names, kind if not names else None)
+    fit = table.fit(best)
+    one_device, remains = posteriors.device(best), posteriors.practical_kind(table, best)
+    device = one_device >= thresholds.STATED  # then what remains has a name, too
+    in_doubt = _imitated(table, best, fit, names)
+    sure = tuple(name for name in names if name not in in_doubt)
+    kept = [n for n in best.causes if name_of(n) not in in_doubt]
+    mostly = device or posteriors.share_of_causes(table, best, kept) >= thresholds.MOST
+    verdict, structure, named, side_force = "undecided", None, (), None
+    either: tuple[str, ...] = ()
+    why = ""
+    if sure and mostly:
+        verdict, named = "named", _named(table, found, best, sure)
+    elif remains != NOMINAL and (kind is not None or names):
+        structure = _structure(table, best, fit)
+        probable = tuple(n for n in best.causes if name_of(n) in found.stated)
+        if one_device == 0.0 and posteriors.explain_more(table, best, probable):
+            either, why = tuple(dict.fromkeys(map(name_of, probable))), EXPLAIN_MORE
+        elif 0.0 < one_device < thresholds.STATED:
+            why = PATTERN
+        elif refuted and not device:
+            either, why = tuple(refuted), REFUTED
+        else:
+            verdict = "unknown"
+    elif found.none_of_all >= thresholds.STATED:
+        verdict = "none"
+    if verdict in ("named", "unknown") and device:
+        verdict, structure, side_force = "named", None, best.side_force
+    traces = ()
+    if verdict == "none":
+        rest = [n for n in map(name_of, best.causes) if n not in names]
+        traces = _named(table, found, best, rest)
+    stands = verdict in ("named", "unknown") or (verdict == "none" and not best.causes)
+    reported = fit if stands else table.fit(table.nothing)
+    if side_force is not None:
+        reported = _with_side_force(reported, side_force)
+    nothing = Fit(table.first, table.nothing.found, reported.remainder)
+    return Decision(
+        verdict, named, structure, side_force, traces,
+        _reasons(search, found, refuted | dict(doubted or {}) | in_doubt, named),
+        found.ranking(either, why, one_device), reported, nothing, search.expected,
+        _in_addition(table, found, best, named), either, why,
+    ), found  # fmt: skip
+
+
+def _imitated(
+    table: Hypotheses, best: Hypothesis, fit: Fit, names: Sequence[str]
+) -> dict[str, str]:
+    """Names → why each is in doubt: the remainder could do most of what the cause does. An offset
+    of the rudder, for instance, may be a part of an unknown force of the controls. That puts no
+    other cause in doubt, nor does a remainder that is slight next to what the cause explains."""
+    shares: dict[str, float] = {}
+    for label in fit.included:
+        name = name_of(label)
+        if label in table.trial.fixed or name not in names:
+            continue
+        if not posteriors.slight(table, best, name):
+            size = _size_without(table, fit.remainder, name)
+            share = fits.imitated(table.trial, fit, label, size)
+            shares[name] = max(share, shares.get(name, 0.0))
+    return {
+        name: f"what remains unknown could do {share:.0%} of it as well"
+        for name, share in shares.items()
+        if share > thresholds.MOST
+    }
+
+
+def _size_without(table: Hypotheses, remainder: Remainder, name: str) -> float:
+    """How large a remainder of this kind would be if it had to do the work of a cause: in the most
+    probable hypothesis without it. With the cause, it is only what the cause leaves."""
+    others = (h.remainder.size for h in table.ranked(name) if h.kind == remainder.kind)
+    return max(remainder.size, next(others, 0.0))
+
+
+def _named(
+    table: Hypotheses, found: Posterior, best: Hypothesis, names: Sequence[str]
+) -> tuple[Named, ...]:
+    """The causes of a hypothesis that have these names, with what else they may be."""
+    by, columns = table.by, table.trial.reference.columns
+    given, at = [], 0
+    for label in best.found.numbers:
+        part = slice(at, at + len(columns.of[label]))
+        at = part.stop
+        if label not in by or name_of(label) not in names or not found.states(label):
+            continue
+        assert best.found.covariance is not None
+        numbers = np.asarray(best.found.numbers[label])
+        form = form_error_of(by[label]) * numbers  # its equations are no better than that
+        unit = by[label].unit_error * numbers  # one error of all numbers of the cause
+        given.append(
+            Named(
+                by[label], table.alone.get(label, float("nan")),
+                found.names.get(name_of(label), 0.0), numbers,
+                best.found.covariance[part, part] + np.diag(form**2) + np.outer(unit, unit),
+                _instead(found, best, label), table.trial.reference.freedom,
+            )
+        )  # fmt: skip
+    return tuple(given)
+
+
+def _in_addition(
+    table: Hypotheses, found: Posterior, best: Hypothesis, named: Sequence[Named]
+) -> tuple[str, ...]:
+    """Names of which one acts in addition to those that are named. A remainder that is not slight
+    could do their work, too."""
+    nominal = posteriors.practical_kind(table, best) == NOMINAL
+    clear = nominal or posteriors.slight(table, best)
+    return found.one_of if named and clear else ()
+
+
+def _instead(found: Posterior, best: Hypothesis, label: str) -> tuple[str, ...]:
+    """Labels of causes of another name that may stand in a cause's place."""
+    rest = set(best.causes) - {label}
+    others: dict[str, None] = {}
+    for one in found.hypotheses:
+        more = set(one.causes) - rest
+        near = best.score - one.score < INSTEAD_NATS and one.kind == best.kind
+        if near and len(more) == 1 and rest <= set(one.causes):
+            (other,) = more
+            if name_of(other) != name_of(label):
+                others.setdefault(other)
+    return tuple(others)
+
+
+def _structure(table: Hypotheses, best: Hypothesis, fit: Fit) -> Structure:
+    gained = best.evidence - table.nothing.evidence
+    family = FAMILY.get(best.kind, best.kind)
+    if family in (STOCHASTIC, INTERMITTENT):
+        channels = EVERYWHERE if family == STOCHASTIC else EVERYWHERE[1:]
+        return Structure(family, gained, channels)
+    return Structure(family, gained, fits.acts_on(table.trial, fit, best.kind))
+
+
+def _with_side_force(fit: Fit, side_force: SideForce) -> Fit:
+    """The same with the intermittent force in its remainder."""
+    return replace(fit, remainder=side_force.remainder)
+
+
+def _reasons(
+    search: Search, found: Posterior, refuted: Mapping[str, str], named: Sequence[Named]
+) -> dict[str, str]:
+    """Label → why it is not named."""
+    table, kept = search.table, {n.cause.name for n in named}
+    reasons = {name: why for name, why in refuted.items() if name not in kept}
+    for label, gained in sorted(table.alone.items(), key=lambda pair: -pair[1])[:MOST_REASONS]:
+        name = name_of(label)
+        if name in kept or name in reasons or table.by[label].special:
+            continue
+        misfit = table.placebo.get(label, 0.0)
+        why = f"log Bayes factor {gained:+.0f} nats by itself"
+        if misfit >= 1.0:
+            why += f", of which a nominal voyage has {misfit:.0f} too"
+        if label in search.diverged:
+            why += ", and no fit: it diverges from there"
+        reasons[label] = f"{why}; probability {found.names.get(name, 0.0):.2f}"
+    return reasons

@@ -1,0 +1,245 @@
+"""Probabilities of causes and remainders, and the verdict that they allow.
+
+P(cause) is the sum over all hypotheses that contain it, each times the probability that its numbers
+are then of practical size. A cause is named where that is at least `thresholds.STATED`; otherwise a
+kind of remainder is, or nothing, or the verdict is undecided.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shiplog.diagnosis import thresholds
+from shiplog.diagnosis.hypotheses.hypothesis import Hypothesis, holds_one, name_of
+from shiplog.diagnosis.hypotheses.search import Search
+from shiplog.diagnosis.hypotheses.table import Hypotheses
+from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED
+from shiplog.diagnosis.verdict.result import REFUTED, SIDE_THRUST
+from shiplog.models.causes.base import deviations
+
+STOCHASTIC = "stochastic"  # the contract's word for raised process noise
+FAMILY = {RAISED: STOCHASTIC}
+DRAWS = 400  # of a cause's numbers; a probability of 0.9 is then known to 0.015
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """What the weighed hypotheses say together.
+
+    hypotheses   best first, with their probabilities [H]
+    names        name of a cause → probability that it acts, and is of practical size
+    labels       the same of each of its kinds, such as each clock
+    kinds        kind of remainder → probability; noise raised by little counts as nominal
+    none         probability that nothing of practical size changed
+    one_of       names, each too improbable to be stated, one of which at least acts: that is
+                 probable enough
+    hidden       name → weight, relative to all these hypotheses, of causes that were only scanned
+    """
+
+    hypotheses: tuple[Hypothesis, ...]
+    probability: np.ndarray
+    names: Mapping[str, float]
+    labels: Mapping[str, float]
+    kinds: Mapping[str, float]
+    none: float
+    hidden: Mapping[str, float]
+    one_of: tuple[str, ...] = ()
+
+    @property
+    def stated(self) -> tuple[str, ...]:
+        """Names that are probable enough to be stated."""
+        return tuple(n for n, p in self.names.items() if p >= thresholds.STATED)
+
+    def states(self, label: str) -> bool:
+        """Whether one kind of a stated cause belongs to the verdict: the likeliest, and others
+        that are probable enough by themselves."""
+        same = {n: p for n, p in self.labels.items() if name_of(n) == name_of(label)}
+        own = same.get(label, 0.0)
+        return own >= thresholds.STATED or own == max(same.values(), default=0.0)
+
+    @property
+    def none_of_all(self) -> float:
+        """Probability that nothing changed, as the ranking has it: causes that these data would
+        hardly show keep what they had before any data."""
+        return self.none / (1.0 + sum(self.hidden.values()))
+
+    @property
+    def remainder(self) -> str | None:
+        """The kind of remainder that is probable enough to be stated; none for `nominal`."""
+        found = [k for k, p in self.kinds.items() if k != NOMINAL and p >= thresholds.STATED]
+        return found[0] if found else None
+
+    def ranking(
+        self, either: Collection[str] = (), why: str = "", device: float = 0.0
+    ) -> dict[str, float]:
+        """Every answer with its probability, likeliest first. Causes that these data would hardly
+        show were not weighed one by one: of "none" they keep what they had before any data.
+
+        either   names of causes that act, or else the remainder does: each has half
+        why      REFUTED: held-out voyages refute `either`; all that is left without has half
+        device   probability that an intermittent force is that of one device
+        """
+        half, rest = (0.5 if either else 1.0), (0.5 if why == REFUTED else 1.0)
+        of = {
+            f"unknown:{FAMILY.get(k, k)}": half * p for k, p in self.kinds.items() if k != NOMINAL
+        }
+        if device and INTERMITTENT in self.kinds:
+            force = of.pop(f"unknown:{INTERMITTENT}")
+            of[SIDE_THRUST] = device * force
+            of |= {f"unknown:{INTERMITTENT}": (1.0 - device) * force} if device < 1.0 else {}
+        of |= {n: half * p if n in either else rest * p for n, p in self.names.items()}
+        of |= dict.fromkeys(either if why == REFUTED else (), half)
+        of["none"] = rest * self.none
+        whole = 1.0 + sum(self.hidden.values())
+        for name, p in self.hidden.items():
+            of[name] = of.get(name, 0.0) + p
+        return dict(sorted(((n, p / whole) for n, p in of.items()), key=lambda pair: -pair[1]))
+
+
+def posterior(search: Search) -> Posterior:
+    """Of the weighed hypotheses, without those that are banned."""
+    kept = search.table.ranked()
+    score = np.array([h.score for h in kept])
+    share = np.exp(score - score.max())
+    share /= share.sum()
+    names: dict[str, float] = {}
+    labels: dict[str, float] = {}
+    kinds: dict[str, float] = {}
+    none = 0.0
+    large_in: list[dict[str, float]] = []
+    for one, p in zip(kept, share, strict=True):
+        real = practical(search.table, one)
+        by_name: dict[str, float] = {}
+        for label, large in real.items():
+            labels[label] = labels.get(label, 0.0) + float(p) * large
+            by_name[name_of(label)] = max(by_name.get(name_of(label), 0.0), large)
+        large_in.append(by_name)
+        for name, large in by_name.items():
+            names[name] = names.get(name, 0.0) + float(p) * large
+        kind = practical_kind(search.table, one)
+        kinds[kind] = kinds.get(kind, 0.0) + float(p)
+        if kind == NOMINAL:
+            none += float(p) * math.prod(1.0 - large for large in by_name.values())
+    names = {name: p for name, p in names.items() if p > 0.0}
+    weight = float(np.exp(score - score.max()).sum())
+    hidden: dict[str, float] = {}
+    weighed = {h.causes for h in kept} | {(label,) for label in search.diverged}
+    for label, one in search.scanned.items():
+        if not holds_one(search.table.banned, (label,)) and (label,) not in weighed:
+            name = name_of(label)
+            hidden[name] = hidden.get(name, 0.0) + float(np.exp(one - score.max())) / weight
+    order = sorted(names, key=lambda name: -names[name])
+    names = {n: names[n] for n in order}
+    one_of = _one_of(names, large_in, share)
+    return Posterior(tuple(kept), share, names, labels, kinds, none, hidden, one_of)
+
+
+def _one_of(
+    names: Mapping[str, float], large_in: Sequence[Mapping[str, float]], share: np.ndarray
+) -> tuple[str, ...]:
+    """The fewest of the likeliest unstated names of which one acts with the stated probability."""
+    group: list[str] = []
+    for name in (n for n, p in names.items() if p < thresholds.STATED):
+        group.append(name)
+        without = [math.prod(1.0 - large.get(n, 0.0) for n in group) for large in large_in]
+        if 1.0 - float(share @ np.array(without)) >= thresholds.STATED:
+            return tuple(group)
+    return ()
+
+
+def practical(table: Hypotheses, one: Hypothesis) -> dict[str, float]:
+    """Label → probability, given this hypothesis, that its numbers are large enough to matter."""
+    reference, covariance = table.trial.reference, one.found.covariance
+    found, at = {}, 0
+    for label, numbers in one.found.numbers.items():
+        part = slice(at, at + len(reference.columns.of[label]))
+        at = part.stop
+        if label not in one.causes:
+            continue
+        drawn = np.asarray(numbers)[None]
+        if covariance is not None:
+            drawn = drawn + _deviations(covariance[part, part])
+        found[label] = float(np.mean(table.by[label].practical(drawn, reference.setting)))
+    return found
+
+
+def _deviations(covariance: np.ndarray) -> np.ndarray:
+    """As `deviations`; none where a fit far behind has no covariance any more. Gaussian, as the
+    evidence is."""
+    try:
+        return deviations(covariance, math.inf, DRAWS)
+    except np.linalg.LinAlgError:
+        return np.zeros((1, len(covariance)))
+
+
+def practical_kind(table: Hypotheses, one: Hypothesis) -> str:
+    """Its kind of remainder; process noise as on an ordinary day is nominal. So is a force at one
+    place that varies as noise does and is no larger: gusts act at one place, and increase with the
+    wind. Noise that no ordinary day has is raised, under whatever prior it was weighed."""
+    if one.kind not in (NOMINAL, RAISED, INTERMITTENT) or device(one):
+        return one.kind
+    acceleration = table.trial.reference.process_noise.acceleration
+    factor = one.remainder.factor_with_force(one.found.noise_factor, acceleration)
+    ordinary = math.exp(thresholds.ORDINARY_SPREADS * table.trial.nominal_spread)
+    if factor < max(thresholds.ORDINARY_NOISE, ordinary):
+        return NOMINAL
+    return RAISED if one.kind == NOMINAL else one.kind
+
+
+def device(one: Hypothesis) -> float:
+    """Probability that what remains is an intermittent force, and that of one device."""
+    return one.side_force.device if one.kind == INTERMITTENT and one.side_force else 0.0
+
+
+def share_of_causes(table: Hypotheses, one: Hypothesis, causes: Sequence[str]) -> float:
+    """Of what a hypothesis explains beyond nothing, the share that these of its causes explain:
+    over nothing with nominal, or with raised process noise. What raised noise explains no cause
+    does, nor what a force explains that counts as such. Nothing, where these causes alone were not
+    weighed."""
+    shares, kinds = [], {NOMINAL, RAISED}
+    if practical_kind(table, one) == NOMINAL:
+        kinds.add(one.kind)
+    for kind in kinds:
+        nothing, alone = table.found.get(((), kind)), table.found.get((tuple(causes), kind))
+        if nothing is not None and one.evidence > nothing.evidence:
+            gained = 0.0 if alone is None else alone.evidence - nothing.evidence
+            shares.append(gained / (one.evidence - nothing.evidence))
+    return max(shares, default=1.0)
+
+
+def slight(table: Hypotheses, one: Hypothesis, cause: str = "") -> bool:
+    """Whether the remainder of a hypothesis adds so little to its causes with nominal process noise
+    that it can be an error of their equations: little of what they explain, or, where that is
+    named, of what one of its causes explains next to the others."""
+    plain = table.found.get((one.causes, NOMINAL))
+    rest = tuple(n for n in one.causes if name_of(n) != cause) if cause else ()
+    less = table.found.get((rest, NOMINAL), table.nothing)
+    whole = one.evidence - less.evidence
+    if plain is None or whole <= 0.0:
+        return False
+    return one.evidence - plain.evidence <= thresholds.SLIGHT * whole
+
+
+def explain_more(table: Hypotheses, one: Hypothesis, causes: Sequence[str]) -> bool:
+    """Whether these causes by themselves explain more than the remainder of a hypothesis does by
+    itself. What is left next to them may then be an error of their equations. Not where one of
+    both was never weighed."""
+    alone = table.found.get((tuple(causes), NOMINAL))
+    remainder = table.found.get(((), one.kind))
+    if not causes or alone is None or remainder is None:
+        return False
+    return alone.evidence > remainder.evidence
+
+
+def best_with(found: Posterior, names: Sequence[str], kind: str | None = None) -> Hypothesis:
+    """The likeliest hypothesis that contains all of these names, each in its likeliest kind; of one
+    kind of remainder where that is given."""
+    holding = [h for h in found.hypotheses if set(names) <= set(map(name_of, h.causes))]
+    holding = [h for h in holding if kind in (None, h.kind)] or holding
+    likeliest = [h for h in holding
+                 if set(names) <= {name_of(n) for n in h.causes if found.states(n)}]  # fmt: skip
+    return (likeliest or holding or found.hypotheses)[0]

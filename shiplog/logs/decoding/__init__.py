@@ -1,0 +1,1 @@
+"""Messages to values: ROS, Protobuf, JSON, and the tables that they fill."""

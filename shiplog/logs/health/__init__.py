@@ -1,0 +1,1 @@
+"""What is lost or damaged in a log, as findings."""

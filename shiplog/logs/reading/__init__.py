@@ -1,0 +1,1 @@
+"""A whole log, read once: its topics as frames, its health."""

@@ -1,0 +1,1 @@
+"""The computer: files, paths, caches, limits of reading, faults nobody foresaw."""

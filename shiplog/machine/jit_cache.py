@@ -1,0 +1,108 @@
+"""JAX in double precision, and functions that are traced once for all ships that are alike.
+
+JAX needs seconds to trace a ship's equations with their derivatives, and milliseconds to load
+what it has traced before. All that a trace depends on is in its key, this program's source with
+it; equations that others wrote (a cause of the user's own) are traced anew each time.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import os
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import jax
+import numpy as np
+from jax import export
+from jax.core import Tracer
+
+from shiplog.machine import disk_cache, files
+
+jax.config.update("jax_enable_x64", True)  # float32 sensitivities do not distinguish causes
+# XLA shares a loop out to as many threads as the machine has cores, and rounds another way where
+# another thread begins. On one thread the numbers are the same on every number of cores, and a
+# diagnosis takes a fifth less processor time. XLA reads this when it first computes.
+os.environ["NPROC"] = "1"
+
+log = logging.getLogger(__name__)
+
+# The emitters of fused loops need twice the time to compile a ship's derivatives, and what they
+# compile is no faster. Measured with `python -m pipelines.experiments.benchmarks.compiling`.
+COMPILER = {"xla_cpu_use_fusion_emitters": False}
+
+
+class Traced:
+    """`jax.jit` of a function of arrays and pytrees; what is given by keyword is static."""
+
+    def __init__(self, function: Callable) -> None:
+        self._function = function
+        self._known: dict[Hashable, Callable] = {}
+
+    def __call__(self, *arguments: Any, **static: Hashable) -> Any:
+        leaves, tree = jax.tree.flatten(arguments)
+        if any(isinstance(leaf, Tracer) for leaf in leaves):
+            return self._function(*arguments, **static)  # within what is traced itself
+        leaves = [leaf if hasattr(leaf, "dtype") else np.asarray(leaf) for leaf in leaves]
+        shapes = tuple((leaf.shape, str(leaf.dtype)) for leaf in leaves)
+        key = (tree, shapes, tuple(sorted(static.items())))
+        if key not in self._known:
+            self._known[key] = self._compiled(tree, leaves, static, repr(key))
+        return self._known[key](*leaves)
+
+    def _compiled(
+        self, tree: Any, leaves: list, static: Mapping[str, Hashable], key: str
+    ) -> Callable:
+        def flat(*given: Any) -> Any:
+            return self._function(*jax.tree.unflatten(tree, given), **static)
+
+        if not _own(tree):
+            return jax.jit(flat, compiler_options=COMPILER)
+        name = f"{self._function.__module__}.{self._function.__qualname__}"
+        digest = hashlib.sha256(disk_cache.source() + f"{jax.__version__} {name} {key}".encode())
+        kept = disk_cache.folder() / "traced" / f"{digest.hexdigest()}.bin"
+        try:
+            found = export.deserialize(bytearray(kept.read_bytes()))
+        except Exception as error:  # not there, or broken in whatever way
+            log.debug("%s is traced: %s", name, error)
+            shapes = [jax.ShapeDtypeStruct(leaf.shape, leaf.dtype) for leaf in leaves]
+            found = export.export(jax.jit(flat))(*shapes)
+            _keep(kept, found)
+        return jax.jit(found.call, compiler_options=COMPILER)
+
+
+def traced(function: Callable) -> Traced:
+    """Instead of `jax.jit`."""
+    return Traced(function)
+
+
+def _keep(kept: Any, found: export.Exported) -> None:
+    try:
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        with files.whole(kept) as partial:
+            partial.write_bytes(found.serialize())
+    except OSError as error:
+        log.info("not kept: %s", error)
+
+
+def _own(tree: Any) -> bool:
+    """Whether all that is static in a tree of arguments is of this program: then its `repr` and
+    the source say what it does."""
+    node = tree.node_data()
+    if node is None:
+        return True
+    kind, static = node
+    return _ours(kind) and _all_ours(static) and all(_own(child) for child in tree.children())
+
+
+def _all_ours(static: Any) -> bool:
+    if isinstance(static, tuple | list):
+        return all(_all_ours(one) for one in static)
+    inner = [getattr(static, f.name) for f in fields(static)] if is_dataclass(static) else []
+    return _ours(type(static)) and _all_ours(inner)
+
+
+def _ours(kind: type) -> bool:
+    return kind.__module__.split(".")[0] in ("builtins", "shiplog")

@@ -1,0 +1,1 @@
+"""Words of the field: channels, units, frames of reference, numbers in sentences."""

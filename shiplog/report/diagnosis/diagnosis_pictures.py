@@ -1,0 +1,184 @@
+"""A diagnosis as the tables that the viewer draws."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from shiplog.diagnosis.hypotheses import intermittent
+from shiplog.diagnosis.linear import linearisation, segment_nodes
+from shiplog.diagnosis.linear.measurement_correction import corrected
+from shiplog.diagnosis.noise import residual_acceleration
+from shiplog.diagnosis.noise.residual_acceleration import around
+from shiplog.diagnosis.residual import external_forces
+from shiplog.diagnosis.trial.trial import Trial
+from shiplog.diagnosis.verdict.result import SIDE_THRUST, Decision
+from shiplog.exceptions import listed
+from shiplog.nomenclature.channels import STATE, VELOCITY
+from shiplog.report import viewer
+from shiplog.report.diagnosis import page
+from shiplog.report.diagnosis.answer import DiagnosedTrial
+from shiplog.report.viewer.diagnosis_data import AFTER, BEFORE, ERROR_COLUMNS, TRACKS, Exhibit
+from shiplog.voyages.rows.recording import Record
+from shiplog.voyages.windows.windows import Windows
+
+NOT_DRAWN = 1e6  # m, m/s: a rollout beyond has left the pond, and is not drawn
+
+
+def save(done: DiagnosedTrial, path: Path) -> None:
+    """The recording of a diagnosis that came to a decision."""
+    viewer.save_diagnosis(exhibit(done), path)
+
+
+def exhibit(done: DiagnosedTrial) -> Exhibit:
+    """Of a diagnosis that came to a decision."""
+    trial, decision = done.trial, done.decision
+    assert trial is not None and decision is not None
+    profile = trial.record.profile
+    residual, named = _residual(done)
+    tracks, errors = _before_and_after(done)
+    return Exhibit(
+        title=f"{profile.ship.name}: {listed(trial.record.names, most=3)}",
+        ship_length=profile.ship.length_m,
+        ship_breadth=profile.ship.breadth,
+        ship_outline=profile.ship.outline or (),
+        banks=profile.site.banks,
+        measured=_measured(trial.record),
+        residual=residual,
+        named=named,
+        extended=tuple(n.cause.label for n in decision.named) if done.after is not None else (),
+        tracks=tracks,
+        errors=errors,
+        report=page.markdown(done.verdict),
+    )
+
+
+def _measured(record: Record) -> pl.DataFrame:
+    """About a row a second."""
+    rows = np.flatnonzero(record.measured)
+    rows = rows[:: max(1, round(1.0 / record.step))]
+    index = {"voyage": [record.names[i] for i in record.voyage[rows]], "time": record.time[rows]}
+    return pl.DataFrame(index | _columns(record.state[rows]))
+
+
+# --- forces ---------------------------------------------------------------------------------------
+
+
+def _residual(done: DiagnosedTrial) -> tuple[pl.DataFrame, tuple[str, ...]]:
+    """Unexplained and named force at the knots, and what the latter is of."""
+    assert done.simulated is not None and done.whole is not None
+    (trial, decision), whole = done.simulated, done.whole
+    ref, record = trial.reference, trial.record
+    nothing = decision.nothing
+    nominal = ref.mean * ref.columns.unit
+    process_noise = trial.process_noise(nothing.remainder, whole.cut)
+    process_noise = process_noise.times(nothing.found.noise_factor)
+    found = residual_acceleration.posterior(*trial.left(whole, nominal), process_noise, record)
+    keep = residual_acceleration.once(found)
+    order = np.argsort(found.rows[keep])
+    rows = found.rows[keep][order]
+    mean, sd = (np.moveaxis(v, 1, -1)[keep][order] for v in (found.mean, found.sd))
+    # columns: the force that one m/s² (rad/s²) takes
+    mass = external_forces.masses(ref.model.stand_in, np.array(list(ref.coefficients.values()))).T
+    names = [n.cause.label for n in decision.named if n.cause.kind != "sensor"]
+    force = _caused(trial, decision, rows) @ mass.T
+    if decision.side_force is not None:
+        names.append(SIDE_THRUST)
+        assert done.trial is not None and done.decision is not None
+        force = force + _side_force(done.trial, done.decision)[rows]
+    if not names:
+        force = np.full_like(force, np.nan)
+    index = {"voyage": [record.names[i] for i in record.voyage[rows]], "time": record.time[rows]}
+    columns = zip(VELOCITY, (mean @ mass.T).T, np.sqrt(sd**2 @ mass.T**2).T, force.T, strict=True)
+    tables = [
+        pl.DataFrame(index | {"force": left, "sd": doubt, "named": caused}).with_columns(
+            pl.lit(channel.name).alias("channel"), pl.col("named").fill_nan(None)
+        )
+        for channel, left, doubt, caused in columns
+    ]
+    return pl.concat(tables), tuple(names)
+
+
+def _caused(trial: Trial, decision: Decision, rows: np.ndarray) -> np.ndarray:
+    """ν̇ [n, 3] that the named causes add where the ship was: a wrong instrument adds none."""
+    ref = trial.reference
+    fixed = dict(decision.nothing.point.numbers)
+    named = {n.cause.label: n.numbers for n in decision.named if n.cause.kind != "sensor"}
+    nominal = np.concatenate((ref.theta, np.zeros(ref.columns.linearised - ref.columns.base)))
+    nominal += (ref.mean * ref.columns.unit)[: len(nominal)]
+
+    def acceleration(numbers: dict[str, np.ndarray]) -> np.ndarray:
+        theta = nominal.copy()
+        theta[ref.columns.base :] += ref.columns.numbers(numbers)
+        was = corrected(ref.model.causes, trial.record, numbers)
+        driven = np.concatenate((was.actuator, was.share[:, None]), 1)
+        state, driven, wind = (around(was, v, rows) for v in (was.state, driven, was.true_wind))
+        # by as many as a segment has knots: that shape is compiled already
+        blocks = -(-len(rows) // trial.grid.knots)
+        state, driven = (
+            np.resize(values, (blocks, trial.grid.knots, values.shape[1]))
+            for values in (state, np.concatenate((driven, wind), 1))
+        )
+        found = linearisation.accelerations(ref.model, theta, state, driven)
+        return found.reshape(-1, 3)[: len(rows)]
+
+    return acceleration(fixed | named) - acceleration(fixed)
+
+
+def _side_force(trial: Trial, decision: Decision) -> np.ndarray:
+    """Force [n, 3] of the thruster that nobody records, at rows that are knots."""
+    assert decision.side_force is not None
+    force, _ = intermittent.force_at_nodes(trial, decision.fit, decision.side_force)
+    whole = np.full(len(trial.record), np.nan)
+    whole[segment_nodes.rows_at_knots(trial.rows, trial.grid)] = force
+    return whole[:, None] * np.array([0.0, 1.0, decision.side_force.lever])
+
+
+# --- windows --------------------------------------------------------------------------------------
+
+
+def _before_and_after(done: DiagnosedTrial) -> tuple[pl.DataFrame, pl.DataFrame]:
+    """Tracks and errors of every window; after, by numbers that were fitted without its voyage."""
+    held, decision = done.held, done.decision
+    if held is None or decision is None:
+        return pl.DataFrame(schema=TRACKS), pl.DataFrame(schema=ERROR_COLUMNS)
+    cut = held.cut
+    states = {BEFORE: held.states_before}
+    if done.after is not None:
+        states[AFTER] = held.states_after(decision)
+    numbered = cut.plan.select(
+        "voyage", pl.int_range(pl.len()).over("voyage").alias("window"),
+        pl.col("elapsed").alias("time"),
+    )  # fmt: skip
+    errors = numbered.with_columns(
+        pl.Series("seconds", cut.dt.sum(1)),
+        *(
+            pl.Series(k, np.where(held.counted, held.parts(v).sum(1), np.nan)).fill_nan(None)
+            for k, v in states.items()
+        ),
+    )
+    if AFTER not in states:
+        errors = errors.with_columns(pl.lit(None, pl.Float64).alias(AFTER))
+    tracks = [_tracks(name, simulated, numbered, cut) for name, simulated in states.items()]
+    return pl.concat(tracks), errors.select(ERROR_COLUMNS.keys())
+
+
+def _tracks(model: str, states: np.ndarray, numbered: pl.DataFrame, cut: Windows) -> pl.DataFrame:
+    """A row a sample; what has left the pond is null."""
+    count, size, _ = states.shape
+    gone = np.logical_or.accumulate(~(np.abs(states).max(-1) < NOT_DRAWN), axis=1)
+    states = np.where(gone[..., None], np.nan, states)
+    index = numbered[np.repeat(np.arange(count), size)]
+    return (
+        index.with_columns(
+            pl.lit(model).alias("model"), pl.col("time") + pl.Series(cut.since.reshape(-1))
+        )
+        .hstack(pl.DataFrame(_columns(states.reshape(-1, 6))))
+        .select(TRACKS.keys())
+    )
+
+
+def _columns(states: np.ndarray) -> dict[str, np.ndarray]:
+    return {channel.name: states[:, i] for i, channel in enumerate(STATE)}

@@ -1,0 +1,1 @@
+"""Errors of models as tables and sentences."""

@@ -1,0 +1,72 @@
+"""What the pictures of a diagnosis consist of: tables that `diagnose` fills and `viewer` draws.
+
+SI and radians throughout; the viewer converts when it labels an axis.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import polars as pl
+
+from shiplog.nomenclature.channels import STATE
+
+BEFORE, AFTER = "before", "after"
+TRACKS = {
+    "model": pl.String, "voyage": pl.String, "window": pl.Int64, "time": pl.Float64,
+    **{channel.name: pl.Float64 for channel in STATE},
+}  # fmt: skip
+ERROR_COLUMNS = {
+    "voyage": pl.String, "window": pl.Int64, "time": pl.Float64, "seconds": pl.Float64,
+    BEFORE: pl.Float64, AFTER: pl.Float64,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Exhibit:
+    """The residual of a model, the named causes, and their gain.
+
+    measured   voyage, time [s from the voyage's start], the six states
+    residual   voyage, time, channel (surge, sway, yaw_rate), force, sd, named [N, N, N m]: the
+               missing force, its standard deviation, and the force of the named causes at the
+               same instant; null without a named cause that exerts a force
+    named      names of the causes of that force
+    extended   names of all causes in the extended model
+    tracks     model (BEFORE or AFTER), voyage, window, time, the six states: every held-out window
+    errors     voyage, window, time (its start), seconds (its length), before, after: L (Eq. 8) of
+               each held-out window; null after where nothing was named, and both null where the
+               model diverges and the window is in none of the figures
+    report     Markdown
+    banks, ship_outline   as a Comparison has them
+    """
+
+    title: str
+    ship_length: float  # m
+    ship_breadth: float  # m
+    measured: pl.DataFrame
+    residual: pl.DataFrame
+    named: tuple[str, ...]
+    extended: tuple[str, ...]
+    tracks: pl.DataFrame
+    errors: pl.DataFrame
+    report: str
+    ship_outline: tuple[tuple[float, float], ...] = ()
+    banks: tuple[tuple[tuple[float, float], ...], ...] = ()
+
+    @property
+    def voyages(self) -> list[str]:
+        """The voyages in the order in which they were given."""
+        return self.measured["voyage"].unique(maintain_order=True).to_list()
+
+    @property
+    def telling(self) -> pl.DataFrame:
+        """Of each voyage the row of `errors` whose error fell most, or, where nothing was named,
+        was largest; the most telling voyage first."""
+        fell = pl.col("before") - pl.col("after").fill_null(0.0)
+        return (
+            self.errors.with_columns(fell=fell)
+            .sort("fell", descending=True, nulls_last=True, maintain_order=True)
+            .group_by("voyage", maintain_order=True)
+            .first()
+            .select(self.errors.columns)
+        )

@@ -1,0 +1,1 @@
+"""What a ship is and where its log has what: the profile, its file, its units."""

@@ -1,0 +1,1 @@
+"""Training of feedforward networks: gradient, kernel, queue of seeds, GPU, cluster."""

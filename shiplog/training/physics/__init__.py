@@ -1,0 +1,1 @@
+"""Identification of physical models: output error, ridge, cross-validation."""

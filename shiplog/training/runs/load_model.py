@@ -1,0 +1,326 @@
+"""A run with its models: what can be simulated, and what a diagnosis changes in it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import polars as pl
+
+from shiplog.exceptions import RunError, listed
+from shiplog.models import NETWORK, PHYSICS, compiled_network, mmg
+from shiplog.models.causes import Cause
+from shiplog.models.coefficients import Parameters
+from shiplog.models.extended import Extended
+from shiplog.models.mmg import MMG
+from shiplog.models.network_shape import Shape
+from shiplog.models.starting_values import Start
+from shiplog.simulation import force_breakdown, prediction_interval
+from shiplog.simulation.extended_simulator import ExtendedSimulator, Extension, campaign
+from shiplog.simulation.sensitivities import Simulator
+from shiplog.training.runs import earlier_runs, extension_file, run_folder
+from shiplog.training.runs.run_folder import RunFolder
+from shiplog.training.settings import run_files
+from shiplog.voyages.rows.recording import Record
+from shiplog.voyages.windows.windows import Windows
+
+if TYPE_CHECKING:
+    from shiplog.models.feedforward import FeedForward, Scaling
+
+HELD_SPREAD = 1e-9  # spread of numbers that a diagnosis leaves where they are
+
+
+class Base(NamedTuple):
+    """What a diagnosis changes: equations with their coefficients, and an MMG of the ship whose
+    coefficients [P'] causes change."""
+
+    model: Any
+    start: Start
+    stand_in: MMG
+    values: np.ndarray
+
+
+@dataclass(frozen=True)
+class Run(RunFolder, ABC):
+    """A run folder whose models can be built.
+
+    extension  causes that a diagnosis named and put into it, with the base's coefficients as the
+               program has them today; None for a plain one
+    """
+
+    extension: Extension | None = None
+
+    @property
+    def label(self) -> str:
+        if self.extension is None:
+            return self.config.label(self.profile.has_wind)
+        return f"{self.config.model} with {listed(c.label for c in self.extension.causes)}"
+
+    @property
+    def fitted_to(self) -> tuple[str, ...]:
+        """Also the voyages that its extension was fitted to."""
+        more = () if self.extension is None else self.extension.shares
+        return tuple(dict.fromkeys((*self.trained_on, *more)))
+
+    def models(self) -> dict[int, Any]:
+        """Seed → what can be simulated: a network in float64, physics with its numbers, or either
+        with causes in it."""
+        one = self.simulator if self.extension is None else self.extended
+        return {seed: one(seed) for seed in self.config.seeds}
+
+    def extended(self, seed: int, record: Record | None = None) -> ExtendedSimulator:
+        """The run's model, with its extension if it has one, ready to absorb causes.
+
+        record   the campaign in which further ones are found
+        """
+        held = self.extension
+        equations, theta, covariance = self._numbers(seed)
+        _, _, stand_in, values = self._plain_base()
+        model = Extended(equations, (), stand_in, values, {})
+        shares, lengths = campaign(record) if record is not None else ({}, {})
+        plain = ExtendedSimulator(model, theta, covariance, self.profile, shares, lengths)
+        if held is None:
+            return plain
+        plain = replace(
+            plain, shares={**held.shares, **shares}, lengths={**held.lengths, **lengths}
+        )
+        return plain.with_causes(
+            held.causes, held.numbers, held.covariance, held.constants, held.coefficients
+        )
+
+    def extension_numbers(self) -> dict[str, np.ndarray]:
+        """Label → numbers of the causes it has already."""
+        return {} if self.extension is None else dict(self.extension.numbers)
+
+    def base(self) -> Base:
+        """What a diagnosis changes, as the run has it: with what its extension did to the
+        coefficients."""
+        plain = self._plain_base()
+        if self.extension is None:
+            return plain
+        return self._with_coefficients(plain, self.extension.coefficients)
+
+    @property
+    @abstractmethod
+    def judges_itself(self) -> bool:
+        """Whether a diagnosis asks this model's own coefficients, and not the ship's MMG."""
+
+    @abstractmethod
+    def judge(self) -> Base:
+        """What a diagnosis asks about causes: of a network the ship's MMG as somebody published
+        it, or as its particulars suggest, fitted to nothing."""
+
+    @property
+    def lacks(self) -> str:
+        """Why causes that change forces cannot be tested with it; empty where they can."""
+        return ""
+
+    @abstractmethod
+    def simulator(self, seed: int) -> Any:
+        """What can be simulated, without an extension."""
+
+    @abstractmethod
+    def spread(self, models: Mapping[int, Any], simulated: list[np.ndarray], cut: Windows) -> Any:
+        """[N, I, 6] how sure the simulated states are: `simulated` by each of the models."""
+
+    @abstractmethod
+    def forces(self, seconds: pl.DataFrame) -> pl.DataFrame | None:
+        """Part by part along measured voyages, as `force_breakdown.along`; None where there are
+        no parts."""
+
+    @abstractmethod
+    def _numbers(self, seed: int) -> tuple[Any, np.ndarray, np.ndarray]:
+        """Equations, coefficients [P] and their covariance [P, P]."""
+
+    @abstractmethod
+    def _plain_base(self) -> Base: ...
+
+    @abstractmethod
+    def _with_coefficients(self, plain: Base, coefficients: np.ndarray) -> Base: ...
+
+    @abstractmethod
+    def _today(self, extension: Extension) -> Extension:
+        """An extension as it was written, with coefficients as today's program orders them."""
+
+
+@dataclass(frozen=True)
+class NetworkRun(Run):
+    """A network has no coefficients. Causes are tested on the ship's MMG in its stead, and
+    are added to it. Torch is loaded where the network itself is asked for."""
+
+    @property
+    def shape(self) -> Shape:
+        net = self.config.network
+        return Shape(
+            len(self.profile.actuators),
+            self.profile.has_wind,
+            net.width,
+            net.depth,
+            net.wind_input,
+            net.input_tanh,
+        )
+
+    def scaling(self) -> Scaling:
+        """Raises UnreadableError."""
+        from shiplog.training.network import network_files
+
+        return network_files.scaling(self.path)
+
+    def empty_model(self) -> FeedForward:
+        from shiplog.models.feedforward import FeedForward
+
+        return FeedForward(self.shape, self.scaling())
+
+    def simulator(self, seed: int) -> FeedForward:
+        from shiplog.training.network import network_files
+
+        return network_files.fill(self.empty_model(), self.seed(seed))
+
+    @property
+    def judges_itself(self) -> bool:
+        return False
+
+    def judge(self) -> Base:
+        ship = mmg.begin(self.profile, self.config.physics)
+        nominal = ship.start
+        start = Start(nominal.values, nominal.spread, nominal.low, nominal.high)
+        return Base(ship.model, start, ship.model, nominal.values)
+
+    def spread(self, models: Mapping[int, Any], simulated: list[np.ndarray], cut: Windows) -> Any:
+        return prediction_interval.seeds_spread(simulated)
+
+    def forces(self, seconds: pl.DataFrame) -> None:
+        return None
+
+    def _numbers(self, seed: int) -> tuple[Any, np.ndarray, np.ndarray]:
+        model = compiled_network.compiled(self.simulator(seed), self.profile.azimuths)
+        return model, np.zeros(0), np.zeros((0, 0))
+
+    def _plain_base(self) -> Base:
+        none = np.zeros(0)
+        network, _, _ = self._numbers(self.config.seeds[0])
+        _, _, stand_in, values = self.judge()
+        return Base(network, Start(none, none, none, none), stand_in, values)
+
+    def _with_coefficients(self, plain: Base, coefficients: np.ndarray) -> Base:
+        return plain._replace(model=plain.model.bend(coefficients))
+
+    def _today(self, extension: Extension) -> Extension:
+        if extension.coefficients.any() and extension.coefficients.ndim != 2:
+            raise RunError(
+                f"{self.name} was extended by an earlier shiplog, which bent networks otherwise.",
+                hint="extend its base again with `shiplog diagnose --extend`.",
+            )
+        return extension
+
+
+@dataclass(frozen=True)
+class PhysicalRun(Run):
+    """A model of named coefficients, on which causes are tested directly."""
+
+    @property
+    def lacks(self) -> str:
+        return self.kind.equations.lacks
+
+    def simulator(self, seed: int) -> Simulator:
+        """The run's equations of the profile's geometry, with the numbers of a seed."""
+        path = self.seed(seed) / "model.safetensors"
+        arrays = run_files.arrays(path)
+        try:
+            model = self.kind.equations.opened(self.profile, self.config.physics, arrays)
+            place = self._kept(seed, len(arrays["theta"]), model.names)
+            theta, covariance = place.vector(arrays["theta"]), place.matrix(arrays["covariance"])
+        except (KeyError, ValueError, TypeError) as error:
+            raise run_files.unreadable(path, error) from error
+        if not np.isfinite(theta).all():
+            raise run_files.unreadable(path, "it holds no finite numbers")
+        return Simulator(model, theta, covariance)
+
+    @property
+    def judges_itself(self) -> bool:
+        return True
+
+    def judge(self) -> Base:
+        return self.base()
+
+    def spread(self, models: Mapping[int, Any], simulated: list[np.ndarray], cut: Windows) -> Any:
+        return next(iter(models.values())).spread(cut)
+
+    def forces(self, seconds: pl.DataFrame) -> pl.DataFrame | None:
+        if self.extension is not None:  # its causes are no part of any force of the equations
+            return None
+        return force_breakdown.along(self.simulator(self.config.seeds[0]), seconds, self.profile)
+
+    def _kept(self, seed: int, count: int, names: Sequence[str]) -> earlier_runs.Kept:
+        neutral = self._nominal().neutral
+        return earlier_runs.kept(self.identified(seed)["name"].to_list(), count, names, neutral)
+
+    def _nominal(self) -> Parameters:
+        """Coefficients of its equations as published or estimated."""
+        return self.kind.equations.begin(self.profile, self.config.physics, None).start
+
+    def _numbers(self, seed: int) -> tuple[Any, np.ndarray, np.ndarray]:
+        own = self.simulator(seed)
+        return own.model, own.theta, own.covariance
+
+    def _plain_base(self) -> Base:
+        nominal = self._nominal()
+        seed = self.config.seeds[0]
+        simulator, known = self.simulator(seed), self.identified(seed)
+        more = len(simulator.theta) - len(nominal.names)
+        place = self._kept(seed, known.height, nominal.names)
+        # a hybrid's network stays as it was trained, and so do terms that the run did not have
+        start = Start(
+            simulator.theta,
+            np.concatenate(
+                (place.vector(known["spread"].to_numpy(), HELD_SPREAD), np.full(more, HELD_SPREAD))
+            ),
+            np.concatenate((nominal.low, np.full(more, -np.inf))),
+            np.concatenate((nominal.high, np.full(more, np.inf))),
+        )
+        return self._standing_in(simulator.model, start)
+
+    def _standing_in(self, model: Any, start: Start) -> Base:
+        """The first coefficients are the MMG's where they have its names; else the ship's MMG is
+        as it was published, or as its particulars suggest."""
+        found = mmg.begin(self.profile, self.config.physics)
+        count = len(found.start.names)
+        own = model.names[:count] == found.start.names
+        values = start.values[:count] if own else found.start.values
+        return Base(model, start, found.model, values)
+
+    def _with_coefficients(self, plain: Base, coefficients: np.ndarray) -> Base:
+        return self._standing_in(plain.model, replace(plain.start, values=coefficients))
+
+    def _today(self, extension: Extension) -> Extension:
+        seed = self.config.seeds[0]
+        names = self.simulator(seed).model.names
+        place = self._kept(seed, len(extension.coefficients), names)
+        return replace(extension, coefficients=place.vector(extension.coefficients))
+
+
+RUNS = {NETWORK.name: NetworkRun, PHYSICS.name: PhysicalRun}
+
+
+def of_folder(folder: RunFolder, causes: Sequence[Cause] = ()) -> Run:
+    """The models of a run folder: a NetworkRun or a PhysicalRun. Raises RunError.
+
+    causes   of the user's own, for a run that was extended by them; see `causes.user.load`
+    """
+    run = RUNS[folder.kind.family.name](folder.path, folder.config, folder.profile)
+    extension = extension_file.read(folder, causes)
+    return run if extension is None else replace(run, extension=run._today(extension))
+
+
+def network(folder: RunFolder) -> NetworkRun:
+    """A network's run folder, finished or partial."""
+    return NetworkRun(folder.path, folder.config, folder.profile)
+
+
+def load(path: str | Path, causes: Sequence[Cause] = ()) -> Run:
+    """A finished run with its models, as `of_folder`. Raises RunError."""
+    return of_folder(run_folder.open_finished(Path(path)), causes)

@@ -1,0 +1,1 @@
+"""Options of a training, the configuration of a run, its files."""

@@ -1,0 +1,1 @@
+"""Sensors that contradict each other grossly, found by counting, before any fit."""

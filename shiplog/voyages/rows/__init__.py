@@ -1,0 +1,1 @@
+"""Rows of a grid: samples between which is interpolated, faults of a channel, 1 Hz means."""

@@ -1,0 +1,1 @@
+"""Small errors of sensors, fitted from one another: scale, offset, delay, lever arm."""

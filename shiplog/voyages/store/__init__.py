@@ -1,0 +1,1 @@
+"""The folder that holds voyages as tables, and its catalogue."""
