@@ -18,7 +18,7 @@ from shiplog.machine import files
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from shiplog import files
+from shiplog.machine import files
 with files.whole(Path(sys.argv[1])) as partial, files.temporary_folder() as folder:
     partial.write_text("half")
     print(folder, flush=True)

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits and sign
 PROGRAM = """
 import os, sys, time
 from pathlib import Path
-from shiplog.logs import reading_limits as limits
+from shiplog.machine import reading_limits as limits
 
 begin = limits.begin
 

@@ -113,7 +113,7 @@ def test_only_a_clean_log_is_given_to_rerun(tmp_path, by_rerun):
 
 SCRIPT = """
 import sys
-from shiplog.logs import rerun_route
+from shiplog.logs.reading import rerun_route
 from shiplog.logs.reading.read import read
 rerun_route.LEAST_MESSAGES = 0
 assert "numba" not in sys.modules and "rerun" not in sys.modules

@@ -23,9 +23,13 @@ ROUNDS = 5
 PROGRAM = """
 import sys
 from pathlib import Path
-from shiplog import profile_file
-from shiplog.voyages.ingest.ingest import ingest
-voyage = ingest(Path(sys.argv[1]), profile_file.load("esso-vectwin"))
+try:
+    from shiplog.ship_profile import file
+    from shiplog.voyages.ingest.ingest import ingest
+except ImportError:  # a build without rooms
+    from shiplog import profile_file as file
+    from shiplog.voyages.ingest import ingest
+voyage = ingest(Path(sys.argv[1]), file.load("esso-vectwin"))
 print(voyage.report.messages_read)
 """
 LEAST_RATIO = 0.9  # of the baseline's messages a second
