@@ -16,6 +16,7 @@ from shiplog.commands.bars import Bars
 from shiplog.exceptions import listed
 from shiplog.logs.health.health_report import CONTRACT
 from shiplog.models.feedforward import scaling
+from shiplog.ship_profile.profile import Profile
 from shiplog.simulation import prediction_interval
 from shiplog.simulation.rollout import simulate
 from shiplog.training.network import gpu
@@ -84,25 +85,47 @@ class Begun:
 def begin(config: Config, store: Store, out: Path) -> Begun:
     """The partial folder of a run, with all that its seeds need. Raises ShiplogError."""
     split = config.split
-    profile = store.profile([*split.training, *split.validation])
+    named = [*split.training, *split.validation]
+    profile = store.profile(named)
+    rows = store.seconds(named, profile)
+    # it may be a part of a training voyage, which stands there under another name
+    standard = store.seconds(config.standard, profile) if config.standard else None
+    return begin_with(config, profile, rows, out, hashes=store.hashes(named), standard=standard)
+
+
+def begin_with(
+    config: Config,
+    profile: Profile,
+    rows: pl.DataFrame,
+    out: Path,
+    *,
+    planned: pl.DataFrame | None = None,
+    hashes: Mapping[str, str | None],
+    standard: pl.DataFrame | None = None,
+) -> Begun:
+    """The same from 1 Hz rows. Raises ShiplogError.
+
+    rows      of the training and the validation voyages, as `one_hertz.resample` gives them
+    planned   the windows of the training voyages, as `split.plan` gives them
+    hashes    voyage → SHA-256 of its log
+    standard  rows whose windows give mean and standard deviation; those of the training voyages
+    """
     profile.require_actuators()
-    rows = store.seconds([*split.training, *split.validation], profile)
+    split = config.split
     learnt = rows.filter(pl.col("voyage").is_in(split.training))
     held = rows.filter(pl.col("voyage").is_in(split.validation))
     refuse_shared_rows(rows, split)
 
     names = (profile.actuator_names, profile.wind_names)
     size = config.window
-    # it may be a part of a training voyage, which stands there under another name
-    standard = store.seconds(config.standard, profile) if config.standard else learnt
+    standard = learnt if standard is None else standard
     reference = windows.cut(standard, plan(standard, "ref", size), size, *names)
-    chosen = plan(learnt, config.data, size)
+    chosen = plan(learnt, config.data, size) if planned is None else planned
     windows.cut(held, plan(held, "ref", size), size, *names)  # or say so before training
     run = run_folder.create(
         out, config, profile, scaling(reference, config.network.wind_input), chosen, learnt, held
     )
     log.info("training %s on %d windows of %s", run.label, chosen.height, listed(split.training))
-    hashes = store.hashes([*split.training, *split.validation])
     return Begun(run, held, hashes, time.time())
 
 
