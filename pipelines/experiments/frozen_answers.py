@@ -1,12 +1,14 @@
 """Answers before and after a change that is to change none: every number, to 1e-9.
 
     python -m pipelines.experiments.frozen_answers write OUT --data DATA --kept DIR [--source DIR]
-    python -m pipelines.experiments.frozen_answers compare BEFORE AFTER
+    python -m pipelines.experiments.frozen_answers compare BEFORE AFTER [--exactly]
 
 `write` runs the commands of the program in --source (this one unless given) on the sample logs, on
 `other_ship` and three trials of the Esso Osaka in DATA, and on eight blind cases that a suite kept
 in DIR. `compare` prints how many values each answer holds, how many differ, and the largest
-difference. Sentences are counted by themselves: their words may change, not their numbers.
+difference. Sentences are counted by themselves: their words may change, not their numbers. With
+--exactly a value differs in its last bit, and the files of stores and runs are compared as well:
+tables, parameters, weights.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from pipelines.experiments import same_numbers
 from shiplog.report.evaluation import tables
 
 ROOT = Path(__file__).parents[2]
@@ -88,7 +91,7 @@ def _run(source: Path, *command: object) -> None:
     print(f"{answer.stem}: exit code {done.returncode}", flush=True)
 
 
-def compare(before: Path, after: Path) -> str:
+def compare(before: Path, after: Path, equal: float = EQUAL) -> str:
     """A row an answer: values, how many differ, sentences that differ, the largest difference."""
     rows = []
     for path in sorted(before.glob("*.json")):
@@ -98,7 +101,7 @@ def compare(before: Path, after: Path) -> str:
             continue
         old, new = dict(_leaves(_read(path, before))), dict(_leaves(_read(other, after)))
         off = {at: _difference(old.get(at), new.get(at)) for at in old.keys() | new.keys()}
-        differ = {at for at, by in off.items() if by > EQUAL}
+        differ = {at for at, by in off.items() if by > equal}
         sentences = {at for at in differ if _is_sentence(old.get(at)) and _is_sentence(new.get(at))}
         values = {at: by for at, by in off.items() if at not in sentences}
         worst = max(values, key=values.__getitem__, default="")
@@ -106,6 +109,22 @@ def compare(before: Path, after: Path) -> str:
                      f"{values.get(worst, 0.0):.1e} {worst}"))  # fmt: skip
     head = ("answer", "values", "differ", "sentences", "largest difference")
     return tables.table(head, rows)
+
+
+def files_compared(before: Path, after: Path) -> str:
+    """The files of stores and runs that differ in any bit."""
+    old, new = same_numbers.content(before), same_numbers.content(after)
+    kept = [name for name in old if name.split("/")[0] not in ("reports", "logs")]
+    differ = [name for name in kept if not _same(name, old[name], new.get(name))]
+    return "\n".join((f"{len(kept)} files of stores and runs: {len(differ)} differ", *differ))
+
+
+def _same(name: str, old: bytes | str, new: bytes | str | None) -> bool:
+    """Whether two files hold the same; of JSON without what `ELSEWHERE` names."""
+    if new is None or not name.endswith(".json"):
+        return old == new
+    one, other = (dict(_leaves(json.loads(text))) for text in (old, new))
+    return one == other
 
 
 def _is_sentence(value: object) -> bool:
@@ -150,9 +169,12 @@ def main() -> None:
     comparing = commands.add_parser("compare")
     comparing.add_argument("before", type=Path)
     comparing.add_argument("after", type=Path)
+    comparing.add_argument("--exactly", action="store_true")
     given = parser.parse_args()
     if given.what == "compare":
-        print(compare(given.before, given.after))
+        print(compare(given.before, given.after, 0.0 if given.exactly else EQUAL))
+        if given.exactly:
+            print(files_compared(given.before, given.after))
         return
     places = (given.out, given.data, given.kept, given.source)
     write(*(path.resolve() for path in places))
