@@ -19,9 +19,9 @@ disk_cache.keep_compiled()
 # Modules of more than twenty seconds, the longest first: the workers then end together. A module is
 # one worker's, with the fixtures that are made once for it.
 LONGEST = (
-    "pipelines/test_real_logs.py", "pipelines/test_demo.py", "diagnosis/test_whole_way.py",
+    "commands/test_real_logs.py", "commands/test_demo.py", "diagnosis/test_whole_way.py",
     "diagnosis/test_whole_way_trials.py", "diagnosis/test_network_base.py",
-    "pipelines/test_tour.py", "pipelines/test_paper.py", "pipelines/test_train_physics.py",
+    "commands/test_tour.py", "commands/test_paper.py", "commands/test_train_physics.py",
     "voyages/test_sensor_consistency.py", "cli/test_endings.py",
     "diagnosis/test_without_wind_sensor.py", "experiments/test_simulated_effects.py",
     "experiments/test_simulated_logs.py", "voyages/test_sensor_correction.py",
