@@ -67,24 +67,25 @@ class Campaign:
 
     @cached_property
     def parts(self) -> tuple[np.ndarray, ...]:
-        """`each` with every part's own numbers integrated out."""
+        """`each` with every part's own numbers b ~ N(0, D) integrated out (`reduced`)."""
         return tuple(reduced(g, self.deviation)[0] for g in self.each)
 
     @cached_property
     def voyages(self) -> tuple[np.ndarray, ...]:
-        """Products of each voyage, its own numbers integrated out."""
+        """Σ_i G_vi of each voyage, its own numbers c ~ N(0, a² D) integrated out."""
         return tuple(
             campaign_prior.of_voyages(self.parts, self.voyage, self.apart * self.deviation)[0]
         )
 
     @property
     def deviation(self) -> np.ndarray:
-        """Of one part's numbers, the unseen families' with them [C + W]."""
+        """D^½ [C + W] of one part's numbers; zero of the unseen families' weights."""
         return np.append(self.effects.deviation, np.zeros(self.unseen.count))
 
     def residual(self, record: Record) -> Linear | None:
-        """The nominal voyages, whose record this is, without what the campaign says and what each
-        of its parts deviates by; None where there are none of the model's own."""
+        """e - J (x̂ + b̂_i) u: the nominal voyages, whose record this is, without what the campaign
+        says and what each of its parts i deviates by, b ~ N(0, (1 + a²) D); None where there are
+        none of the model's own."""
         made = self.reference
         if made.nominal is None or made.misfit is None or not self.rows:
             return None
@@ -98,8 +99,8 @@ class Campaign:
         return made.nominal.less_numbers(numbers, weights)
 
     def prior_without(self, left_out: int, apart: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Information and pull of θ, one nominal voyage left out; of the numbers of a voyage that
-        is so far `apart`."""
+        """Λ [C, C] and η [C] (`campaign_prior.prior`), one nominal voyage left out; of the numbers
+        of a voyage that is so far `apart`, a."""
         known = self.effects.size**-2.0
         count = 1 + len(known)
         kept = [g[:count, :count] for i, g in enumerate(self.voyages) if i != left_out]
@@ -111,10 +112,16 @@ def learn(
     model: Extended, setting: Setting, start: Start, record: Record, at: Converged,
     found: Characteristics, numbers: Mapping[str, np.ndarray] | None = None,
 ) -> Campaign:  # fmt: skip
-    """The campaign as a trial's causes see it, which depend on where the trial was. `numbers` as in
-    `assumed`."""
+    """The campaign as a trial's causes see it, which depend on where the trial was: linearised
+    about θ*, with the products of its parts and the prior of a trial's numbers,
+
+        Λ = (V + δ²)⁻¹,  V = (K + κ Σ_v M_v)⁻¹,  m = V (η + κ Σ_v g_v)      `campaign_prior.prior`
+
+    δ = a D^½ where there is one voyage only, whose parts then count as voyages. `numbers` as in
+    `assumed`. Raises np.linalg.LinAlgError where a matrix is singular.
+    """
     made = nominal_pass(model, setting, start, record, replace(at, path=found.path), numbers)
-    columns, held, families = made.columns, made.held, made.families
+    columns, anchor, families = made.columns, made.anchor, made.families
     process_noise, known = found.process_noise, made.columns.known
     modes = likelihood.modes(likelihood.weighed(made.linear, process_noise), process_noise).joined(
         made.accelerations
@@ -140,10 +147,10 @@ def learn(
     if len(np.unique(voyage)) == 1:  # its parts share its deviation, which another voyage has not
         voyage, own = np.arange(len(parts)), found.apart * deviation
     voyages, _ = campaign_prior.of_voyages(parts, voyage, found.apart * deviation)
-    information, pull = prior(voyages, size**-2.0, held, own, found.share)
+    information, pull = prior(voyages, size**-2.0, anchor, own, found.share)
     reference_made = Reference(
         model, setting, at.theta, columns, process_noise, nominal_fit.wide_of(setting),
-        information, pull, held, made.linear,
+        information, pull, anchor, made.linear,
         nominal_reference.freedom(len(voyages)),
         misfit=families,  # type: ignore[arg-type]  # it acts as a network's Misfit does
         counts=found.share,
@@ -159,7 +166,8 @@ def learn(
 
 
 def widened(model: Extended, setting: Setting, start: Start) -> Start:
-    """Coefficients at least as free on the nominal voyages as any cause makes them in a trial."""
+    """u_i ← max(u_i, max over causes |Δθ_i|): coefficients at least as free on the nominal voyages
+    as any cause of realistic size makes them in a trial."""
     names = model.base.names
     values = dict(zip(names, start.values, strict=True))
     spread = start.spread.copy()
