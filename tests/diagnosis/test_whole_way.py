@@ -210,7 +210,7 @@ def test_the_manoeuvre_that_separates_is_the_seamans(sea):
     grams = dict(
         zip(
             (m.text(1.0) for m in next_manoeuvre.MANOEUVRES),
-            next_manoeuvre.sailed(trial, {}),
+            next_manoeuvre.products_of_manoeuvres(trial, {}),
             strict=True,
         )
     )
@@ -219,7 +219,7 @@ def test_the_manoeuvre_that_separates_is_the_seamans(sea):
     def worth(label, numbers, other):
         one = replace(sea.done.decision.named[0], cause=by[label], numbers=np.array(numbers))
         return {
-            w.split(",")[0]: next_manoeuvre.apart(trial, g, one, other) for w, g in grams.items()
+            w.split(",")[0]: next_manoeuvre.separation(trial, g, one, other) for w, g in grams.items()
         }
 
     lag = worth("rudder_lag", [2.0], "rudder_delay")

@@ -1,4 +1,8 @@
-"""Where a model errs: by channel, outside its training data, where an external force acts."""
+"""Where a model errs: by channel, outside its training data, where an external force acts.
+
+All of it is of the residual e - J d of the model as it stands, its discrepancy and the parts' own
+numbers taken out.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +47,7 @@ def external(
     residual, d = fits.residual(trial, fits.of_parts(trial, whole, fit), fit)
     process_noise = trial.process_noise(remainder, whole.cut).times(base.noise_factor)
     found: tuple[external_forces.Stretch, ...] = ()
-    if external_forces.driven(physics):
+    if external_forces.has_propulsion(physics):
         weighed = external_forces.balance(residual, d, process_noise, trial.record, physics, values)
         found = external_forces.find(weighed, trial.record)
         if found and nominal is not None:
