@@ -84,8 +84,8 @@ class Tried:
 
 
 def best(simulator: ExtendedSimulator, cut: Windows) -> tuple[str, float]:
-    """The change of convention with the smallest mean L on these windows, in words, and that L. A
-    window in which the model diverges has an L of RUNAWAY."""
+    """argmin over conventions of mean L on these windows, in words, and that L. A window in which
+    the model diverges has an L of RUNAWAY."""
     found = tried(simulator, cut)
     return found.words, found.loss
 
@@ -94,7 +94,9 @@ def tried(
     simulator: ExtendedSimulator, cut: Windows, nominal: Windows | None = None,
     read_as: Profile | None = None,
 ) -> Tried:  # fmt: skip
-    """As `best`. Where nominal windows are given, conventions that these show as well are left
+    """As `best`: argmin of h L max(L_hold/L_hold', 1), with L_hold of constant velocities as the
+    windows are and L_hold' under the convention, and a handicap h (NEARLY, UNSTATED, else 1).
+    Where nominal windows are given, conventions that these show as well (L'/L ≤ THERE_TOO) are left
     out: their model has them, too.
 
     read_as   the profile through which the windows were read; None where it is not known
@@ -312,7 +314,7 @@ def _of_velocity(
 
 
 def _moving(seen: Sighted, cut: Windows) -> np.ndarray:
-    """[n, 2] velocity of the positions over ground, by differences."""
+    """(p_{k+1} - p_{k-1})/(t_{k+1} - t_{k-1}) [n, 2] m/s: velocity of the positions over ground."""
     position = seen.position.reshape(*cut.state.shape[:2], 2)
     since = np.pad(np.cumsum(cut.dt, axis=1), ((0, 0), (1, 0)))[..., None]
     rate = np.empty(position.shape)
@@ -322,8 +324,8 @@ def _moving(seen: Sighted, cut: Windows) -> np.ndarray:
 
 
 def _aligned(heading: np.ndarray, seen: Sighted, cut: Windows, over_ground: bool) -> np.ndarray:
-    """A heading [n] whose zero is lost, turned in each window so that the ship goes ahead in the
-    mean: as the velocity over ground goes."""
+    """ψ + arg Σ (V_N + i V_E) exp(-iψ) [n] rad: a heading whose zero is lost, turned in each window
+    so that the ship goes ahead in the mean, as the velocity V over ground goes."""
     if not over_ground:
         return heading
     count, size, _ = cut.state.shape
@@ -353,9 +355,10 @@ def sentence(found: Tried, own: float) -> str:
 
 
 def explains(found: Tried, own: float, after: float, hold: float, level: float | None) -> bool:
-    """Whether a convention is the explanation: it leaves less than half of the model's error, and
-    less than constant velocities have; it takes away most of what the trial has more than the
-    nominal voyages; and no causes leave less.
+    """Whether a convention, of mean L', is the explanation: it leaves less than half of the model's
+    error, and less than constant velocities have, L' < min(TURNED_SIGN own, hold); and less than
+    TURNED_SIGN `after`, or else it takes away most of what the trial has more than the nominal
+    voyages, own - L' ≥ MOST_OF_EXCESS (own - level), and no causes leave less, L' ≤ after.
 
     own, after  mean L as log and profile have it, without and with the named causes
     hold        of constant velocities
