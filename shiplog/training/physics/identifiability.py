@@ -1,4 +1,8 @@
-"""Parameters that the data could not separate, as sentences of the report."""
+"""Parameters that the data could not separate, as sentences of the report.
+
+Of the estimate's covariance C and the plausible spreads s: a parameter is undetermined where
+C_ii^½ > SILENT s_i, and two are not separated where |C_ij|/(C_ii C_jj)^½ > TRADING.
+"""
 
 from __future__ import annotations
 
@@ -24,19 +28,20 @@ QUESTIONS = {  # part of the model → what else may be wrong
 
 
 def silent(found: Identified, spread: np.ndarray) -> np.ndarray:
-    """Mask [P] of free parameters that stand where the ridge holds them."""
+    """C_ii^½ > SILENT s_i [P]: mask of free parameters that stand where the ridge holds them."""
     return found.free & (found.standard_error > SILENT * spread)
 
 
 def correlations(found: Identified) -> np.ndarray:
-    """[P, P], zero where a parameter was held."""
+    """C_ij/(C_ii C_jj)^½ [P, P], zero where a parameter was held."""
     error = found.standard_error
     scale = np.where(error > 0, error, 1.0)
     return found.covariance / np.outer(scale, scale) * (np.outer(error, error) > 0)
 
 
 def trades(found: Identified) -> list[tuple[int, int, float]]:
-    """Pairs of parameters that only show together, strongest first."""
+    """Pairs i < j with |correlation| > TRADING, strongest first: parameters that only show
+    together."""
     matrix = np.triu(correlations(found), 1)
     rows, columns = np.nonzero(np.abs(matrix) > TRADING)
     pairs = [(int(i), int(j), float(matrix[i, j])) for i, j in zip(rows, columns, strict=True)]
