@@ -69,8 +69,7 @@ def identify(
     most: int = MOST_EVALUATIONS,
     rounds: int = REWEIGHTINGS,
 ) -> Identified:
-    """θ̂ = argmin Σ_w ω_w L_w(θ)/σ² + Σ_i ((θ_i - θ₀_i)/(φ s_i))²; in each round σ² is that of the
-    fit before it, until it changes by less than 5 %.
+    """θ̂ = argmin Σ_w ω_w L_w(θ)/σ² + |(θ - θ₀)/(φ s)|², σ² in each round of the fit before it.
 
     start, spread   θ₀, s [P]  where the ridge holds each parameter, and how firmly
     bounds          low, high [P]  physical range
