@@ -49,7 +49,7 @@ class Smooth(Physical, Protocol):
 # --- integration: two-step Adams-Bashforth, one evaluation a step ---------------------------------
 
 
-def finer(model: Smooth, step: float) -> int:
+def stable_steps(model: Smooth, step: float) -> int:
     """Steps between two nodes with which the integration is as stable as in training.
 
     On the negative real axis the explicit Euler method is stable for |λ| h up to 2, two-step
@@ -337,7 +337,7 @@ def simulated(model, theta, segments, path, g, moved=None):
 
 def _every(model, theta, segments, path, g, moved):
     """`simulated`, chunk by chunk: y_b = (1/T) ∫ x dt over each bin of T s, by the trapezium."""
-    many = finer(model, segments.step)
+    many = stable_steps(model, segments.step)
     step = segments.step / many
     acceleration, hats = path.at_nodes(g), _between(g.weights[None], many)[0]
     per = many * (g.nodes - 1) // g.bins

@@ -110,6 +110,6 @@ def read(
                 moved[..., -2:, column] = change / apart
             if more.state is not less.state:
                 between = replace(more, state=more.state - less.state)
-                observed[..., column] = segments.averaged(between, rows) / apart
+                observed[..., column] = segments.means_of_bins(between, rows) / apart
         before = corrected((cause,), before, given)
     return base, moved, observed

@@ -109,10 +109,10 @@ def measured(record: Record, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     g = grid(record)
     whole, ends, per = _in_bins(record.measured[:, None].astype(float), rows, g)
     measured = whole + ends[:, 1:] > 0.5 * (per + 1)
-    return averaged(record, rows), np.repeat(measured, 6, axis=-1)
+    return means_of_bins(record, rows), np.repeat(measured, 6, axis=-1)
 
 
-def averaged(record: Record, rows: np.ndarray) -> np.ndarray:
+def means_of_bins(record: Record, rows: np.ndarray) -> np.ndarray:
     """y_b = (½ x₀ + x₁ + … + x_{n-1} + ½ xₙ) / n: means of the state over bins [S, B, 6], by the
     trapezium over the n rows that a bin goes on for."""
     whole, ends, per = _in_bins(record.state, rows, grid(record))

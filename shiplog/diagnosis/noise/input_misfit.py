@@ -50,7 +50,7 @@ class Misfit:
         return (self.axes @ weights).T
 
 
-def of(
+def estimate(
     network: Network, cut: Cut, g: SegmentGrid, modes: Modes, known: np.ndarray,
     unit: np.ndarray, acceleration: np.ndarray,
 ) -> Misfit:  # fmt: skip

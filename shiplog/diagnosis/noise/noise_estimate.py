@@ -33,7 +33,7 @@ ENOUGH_SEGMENTS = 8  # unbroken segments, fewer of which do not show it
 LEAST_NOISE = np.array([1e-3, 5e-4, 1e-3, 5e-4, 1e-4, 1e-4])  # of the noise: m, m/s, rad, rad/s
 
 
-def learnt(
+def estimate(
     linear: Linear, d: np.ndarray, process_noise: ProcessNoise, rounds: int = 4
 ) -> ProcessNoise:
     """Instrument and process noise that fit the residuals of d, by expectation-maximisation

@@ -80,7 +80,7 @@ def posterior(
     )
 
 
-def once(found: Unexplained) -> np.ndarray:
+def unique_instants(found: Unexplained) -> np.ndarray:
     """[S, J] bool: each instant once, by the better known of nodes less than half a step apart.
 
     Two segments share the node where they meet, and the last of a stretch overlaps.
@@ -106,9 +106,9 @@ def table(found: Unexplained, record: Record) -> pl.DataFrame:
 
     voyage, time_s, ACCELERATIONS, the same with _sd, x0, y0, heading in (-π, π], surge, sway,
     yaw_rate, the actuators, wind_ahead, wind_starboard (apparent, where it comes from), share (of
-    the campaign). Motion, actuators and wind are means over a node's step about it (`around`).
+    the campaign). Motion, actuators and wind are means over a node's step about it (`means_about`).
     """
-    keep = once(found)
+    keep = unique_instants(found)
     rows = found.rows[keep]
     order = np.argsort(rows)
     rows = rows[order]
@@ -119,18 +119,21 @@ def table(found: Unexplained, record: Record) -> pl.DataFrame:
     for kind, values in (("", found.mean), ("_sd", found.sd)):
         for channel, name in enumerate(ACCELERATIONS):
             columns[name + kind] = values[:, channel][keep][order]
-    x0, surge, y0, sway, heading, yaw_rate = around(record, record.state, rows).T
+    x0, surge, y0, sway, heading, yaw_rate = means_about(record, record.state, rows).T
     columns |= {
         "x0": x0, "y0": y0, "heading": np.arctan2(np.sin(heading), np.cos(heading)),
         "surge": surge, "sway": sway, "yaw_rate": yaw_rate,
     }  # fmt: skip
-    actuator, wind = around(record, record.actuator, rows), around(record, record.wind, rows)
+    actuator, wind = (
+        means_about(record, record.actuator, rows),
+        means_about(record, record.wind, rows),
+    )
     columns |= dict(zip(record.profile.actuator_names, actuator.T, strict=True))
     columns |= {"wind_ahead": wind[:, 0], "wind_starboard": wind[:, 1], "share": record.share[rows]}
     return pl.DataFrame(columns)
 
 
-def around(record: Record, values: np.ndarray, rows: np.ndarray) -> np.ndarray:
+def means_about(record: Record, values: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """x̄ᵢ = Σ_{|k - i| ≤ h} xₖ / (2h + 1): means [m, c] of values [n, c] over the time between two
     nodes, about rows i [m]; over less of it at the ends of a stretch."""
     half = round(0.5 * record.timescale.knot / record.step)

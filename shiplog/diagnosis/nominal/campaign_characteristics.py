@@ -184,7 +184,7 @@ def _noise_of_parts(
     for rows, numbers in zip(made.rows, effects.numbers, strict=True):
         own[rows] = numbers * made.columns.unit
     left = made.linear.less_numbers(own, made.accelerations).pick(kept)
-    return noise_estimate.learnt(left, np.zeros(made.columns.linearised), process_noise, rounds=3)
+    return noise_estimate.estimate(left, np.zeros(made.columns.linearised), process_noise, rounds=3)
 
 
 def noise_time(
@@ -208,7 +208,9 @@ def noise_time(
             for _ in range(2 if factor == 1.0 else 1):
                 numbers, _ = _solved(linear, accelerations, tried, columns, anchor)
                 left = linear.less(accelerations @ numbers[columns.linearised :])
-                tried = noise_estimate.learnt(left, numbers[: columns.linearised], tried, rounds=2)
+                tried = noise_estimate.estimate(
+                    left, numbers[: columns.linearised], tried, rounds=2
+                )
             _, value = _solved(linear, accelerations, tried, columns, anchor)
             if value < best:
                 break

@@ -311,7 +311,7 @@ class _Joint:
         count = self.columns.linearised
         left = self.linear.less(self.accelerations @ found[count:])
         numbers = (found * self.columns.unit)[:count]
-        return noise_estimate.learnt(left, numbers, process_noise, rounds=rounds)
+        return noise_estimate.estimate(left, numbers, process_noise, rounds=rounds)
 
 
 def most_probable_within(

@@ -162,7 +162,7 @@ def assume(
     g = segments.grid(record)
     linear = linearisation.linear(model, whole, cut, g, at.path, moved, observed)
     modes = likelihood.modes(likelihood.weighed(linear, at.process_noise), at.process_noise)
-    wrong = input_misfit.of(
+    wrong = input_misfit.estimate(
         inputs, linear.cut, g, modes, columns.known, columns.unit, at.process_noise.acceleration
     )  # fmt: skip
     anchor = np.append(anchored(start, at.theta, columns), np.zeros(wrong.count))

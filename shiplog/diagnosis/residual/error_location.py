@@ -33,7 +33,7 @@ from shiplog.voyages.store.store import Store
 from shiplog.voyages.windows.windows import Windows
 
 
-def external(
+def find_external_forces(
     trial: Trial, point: Point, whole: Linear, remainder: Remainder, nominal: Record | None
 ) -> tuple[list[Interval], np.ndarray]:
     """Stretches that no force of the ship explains, and the segments [S] bool that they touch: what
@@ -74,7 +74,7 @@ def _nominal_excess(trial: Trial, nominal: Record) -> np.ndarray | None:
     return external_forces.largest_excess(weighed, nominal)
 
 
-def by_channel(held: HeldOut) -> list[dict]:
+def errors_by_channel(held: HeldOut) -> list[dict]:
     """Shares of the error of the windows, as the contract's `wrong`."""
     shares, _ = campaign(held.trial.record)
     share = [shares.get(v, (1.0, 1.0))[0] for v in held.voyages]
@@ -84,7 +84,7 @@ def by_channel(held: HeldOut) -> list[dict]:
     return [c.as_json() for c in found.channels]
 
 
-def depends_on(trial: Trial, nothing: Fit, whole: Linear) -> tuple[Dependence, ...]:
+def find_omitted_inputs(trial: Trial, nothing: Fit, whole: Linear) -> tuple[Dependence, ...]:
     """What the model cannot see and the residual depends on, with no cause named."""
     found = residual_acceleration.posterior(
         *fits.residual(trial, whole, nothing),
@@ -97,7 +97,7 @@ def depends_on(trial: Trial, nothing: Fit, whole: Linear) -> tuple[Dependence, .
     )
 
 
-def uncovered(
+def uncovered_windows(
     run: Run, store: Store, names: Sequence[str], profile: Profile, cut: Windows
 ) -> list[Interval]:
     """Windows outside the training data."""

@@ -172,14 +172,14 @@ def balance(
     sd_F = np.sqrt(sd**2 @ M.T**2)
     spread = 1.4826 * np.median(np.abs(F), axis=0)
     misfit = np.sqrt(np.maximum(spread**2 - np.median(sd_F, axis=0) ** 2, 0.0))
-    state = residual_acceleration.around(record, record.state, rows)
-    actuator = residual_acceleration.around(record, record.actuator, rows)
+    state = residual_acceleration.means_about(record, record.state, rows)
+    actuator = residual_acceleration.means_about(record, record.actuator, rows)
     own = np.abs(_forces(physics, values, state, actuator)["hull"])
     own += np.where(_resting(record, physics, rows), RESTING, 1.0)[:, None] * full
     if physics.geometry.wind:
         angle = np.linspace(0.0, 2.0 * math.pi, 73)
         worst = np.abs(np.asarray(_of_wind(physics, values, np.cos(angle), np.sin(angle)))).max(0)
-        speed = np.linalg.norm(residual_acceleration.around(record, record.wind, rows), axis=1)
+        speed = np.linalg.norm(residual_acceleration.means_about(record, record.wind, rows), axis=1)
         own += (GUST * speed[:, None]) ** 2 * worst
     return Balance(rows, F, sd_F, own, misfit, full)
 
@@ -288,7 +288,7 @@ def _contradicted(record: Record, rows: np.ndarray) -> np.ndarray:
 
 def _knots(found: Unexplained) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Rows [K] in order, means and standard deviations [K, 3], each instant once."""
-    keep = residual_acceleration.once(found)
+    keep = residual_acceleration.unique_instants(found)
     order = np.argsort(found.rows[keep])
     mean, sd = (np.moveaxis(v, 1, -1)[keep][order] for v in (found.mean, found.sd))
     return found.rows[keep][order], mean, sd

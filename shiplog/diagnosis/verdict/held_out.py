@@ -195,7 +195,7 @@ class HeldOut(Rollouts):
     @cached_property
     def _other(self) -> sign_conventions.Tried:
         counted = self.cut.pick(np.flatnonzero(self.counted))
-        return sign_conventions.tried(self.before, counted, self.nominal, self.read_as)
+        return sign_conventions.try_conventions(self.before, counted, self.nominal, self.read_as)
 
     @cached_property
     def _level(self) -> float | None:

@@ -86,11 +86,11 @@ class Tried:
 def best(simulator: ExtendedSimulator, cut: Windows) -> tuple[str, float]:
     """argmin over conventions of mean L on these windows, in words, and that L. A window in which
     the model diverges has an L of RUNAWAY."""
-    found = tried(simulator, cut)
+    found = try_conventions(simulator, cut)
     return found.words, found.loss
 
 
-def tried(
+def try_conventions(
     simulator: ExtendedSimulator, cut: Windows, nominal: Windows | None = None,
     read_as: Profile | None = None,
 ) -> Tried:  # fmt: skip
@@ -133,7 +133,7 @@ def _hold(cut: Windows) -> float:
     return float(parts(cut.state[:, :1] - cut.state, cut.dt).sum(1).mean()) if len(cut) else 0.0
 
 
-def other(profile: Profile, cut: Windows) -> Iterator[tuple[str, Windows]]:
+def windows_under_conventions(profile: Profile, cut: Windows) -> Iterator[tuple[str, Windows]]:
     """Each convention in words, and the windows under it."""
     for one in conventions(profile, cut):
         yield one.words, one.windows
@@ -141,7 +141,7 @@ def other(profile: Profile, cut: Windows) -> Iterator[tuple[str, Windows]]:
 
 def conventions(profile: Profile, cut: Windows, read_as: Profile | None = None) -> Iterator[Turned]:
     """Signs of actuators of a kind, twins exchanged, their units; the wind's direction and unit;
-    heading, yaw rate and velocity. read_as   as `tried` has it"""
+    heading, yaw rate and velocity. read_as   as `try_conventions` has it"""
     yield from _of_actuators(profile, cut, read_as)
     if cut.wind.shape[-1]:
         yield from _of_wind(cut, read_as)
@@ -335,13 +335,13 @@ def _aligned(heading: np.ndarray, seen: Sighted, cut: Windows, over_ground: bool
     return (each + np.angle(along.sum(1))[:, None]).reshape(-1)
 
 
-def at_once(
+def sufficient_convention(
     simulator: ExtendedSimulator, cut: Windows, nominal: Windows, read_as: Profile | None = None
 ) -> str:
     """What a convention explains so well that no search for causes is needed: it leaves next to
     nothing of what the trial has more than the nominal voyages. Empty where none does."""
     own, level = _mean(simulator, cut), _mean(simulator, nominal)
-    found = tried(simulator, cut, nominal, read_as)
+    found = try_conventions(simulator, cut, nominal, read_as)
     if own - found.loss < thresholds.ALL_EXCESS * (own - level):
         return ""
     return sentence(found, own) if explains(found, own, own, _hold(cut), level) else ""

@@ -27,7 +27,7 @@ QUESTIONS = {  # part of the model → what else may be wrong
 }
 
 
-def silent(found: Identified, spread: np.ndarray) -> np.ndarray:
+def undetermined(found: Identified, spread: np.ndarray) -> np.ndarray:
     """C_ii^½ > SILENT s_i [P]: mask of free parameters that stand where the ridge holds them."""
     return found.free & (found.standard_error > SILENT * spread)
 
@@ -39,7 +39,7 @@ def correlations(found: Identified) -> np.ndarray:
     return found.covariance / np.outer(scale, scale) * (np.outer(error, error) > 0)
 
 
-def trades(found: Identified) -> list[tuple[int, int, float]]:
+def correlated_pairs(found: Identified) -> list[tuple[int, int, float]]:
     """Pairs i < j with |correlation| > TRADING, strongest first: parameters that only show
     together."""
     matrix = np.triu(correlations(found), 1)
@@ -48,7 +48,7 @@ def trades(found: Identified) -> list[tuple[int, int, float]]:
     return sorted(pairs, key=lambda pair: -abs(pair[2]))
 
 
-def note(
+def describe(
     found: Identified,
     names: Sequence[str],
     spread: np.ndarray,
@@ -57,15 +57,15 @@ def note(
 ) -> list[str]:
     """Sentences for a report: correlated, undetermined and limited parameters."""
     sentences = []
-    for i, j, value in trades(found)[:MOST_PAIRS]:
+    for i, j, value in correlated_pairs(found)[:MOST_PAIRS]:
         sentences.append(
             f"{meaning(names[i])} ({names[i]}) and {meaning(names[j])} ({names[j]}) trade against "
             f"each other here: correlation {value:+.2f}."
         )
-    more = len(trades(found)) - MOST_PAIRS
+    more = len(correlated_pairs(found)) - MOST_PAIRS
     if more > 0:
         sentences.append(f"{more} more pairs correlate above {TRADING}.")
-    quiet = [names[int(i)] for i in np.flatnonzero(silent(found, spread))]
+    quiet = [names[int(i)] for i in np.flatnonzero(undetermined(found, spread))]
     if quiet:
         sentences.append(
             f"These data say nothing about {', '.join(quiet)}: they stand where they started."
