@@ -158,7 +158,8 @@ def _accelerations(model, theta, states, driven):
 
 
 def resampled(at: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Linear in between, constant beyond; values [S, n, c] at times [n]."""
+    """v(t) = vᵢ + (t - tᵢ)/(tᵢ₊₁ - tᵢ) (vᵢ₊₁ - vᵢ) at the times `wanted` [m], constant beyond; of
+    values [S, n, c] at times `at` [n]."""
     right = np.clip(np.searchsorted(at, wanted), 1, len(at) - 1)
     part = np.clip((wanted - at[right - 1]) / (at[right] - at[right - 1]), 0.0, 1.0)
     left = values[:, right - 1]
@@ -307,9 +308,10 @@ def chunks(count: int) -> Iterator[tuple[slice, Callable[[np.ndarray], np.ndarra
 
 
 def _along(model, theta, states, driven, step, *, coefficients) -> list[np.ndarray]:
-    """`_slopes` at every node, by segments: [S, K, 3, 6 or D or P; P only where `coefficients` are
-    asked for]. Those of a model that is smooth and takes long (a network) are worked out as often
-    as they change, and go straight between."""
+    """∂f/∂x, ∂f/∂u, ∂f/∂θ (`_slopes`) at every instant of a step, by segments [S, K, 3, 6 or D or
+    P; P only where `coefficients` are asked for]. Those of a model that is smooth and takes long (a
+    network) are worked out as often as they change, and go straight between:
+    A(tₖ) = A_left + (tₖ - t_left)/(t_right - t_left) (A_right - A_left)."""
     nodes = states.shape[1]
     stride = max(round(model.smooth / step), 1)
     at = np.unique(np.append(np.arange(0, nodes, stride), nodes - 1))

@@ -31,6 +31,7 @@ class Columns:
     misfit: int = 0
 
     def with_misfit(self, count: int) -> Columns:
+        """With `count` weights w behind θ, of unit one."""
         return replace(self, unit=np.concatenate((self.unit, np.ones(count))), misfit=count)
 
     @property

@@ -27,6 +27,9 @@ class Knots:
 
 
 def at_knots(segments: Cut, g: SegmentGrid) -> Knots:
+    """State and what drives at the nodes, the measured means of bins straight in between. Through
+    water that moves with V: (u, v) - Rᵀ(ψ) V, and the wind over the water W + V, where W is where
+    the wind comes from."""
     centre = (np.arange(g.bins) + 0.5) * g.seconds / g.bins
     every = round(g.knot / (g.step * g.every))
     state = resampled(centre, segments.y, np.arange(g.knots) * g.knot)

@@ -143,7 +143,9 @@ def of(
 
 
 def _waves(name: str, *campaigns: Knots) -> Waves | None:
-    """None where nothing of the family varies."""
+    """√(2/F) cos(z · ω_f + φ_f), z [n] standardised, ω_f ~ N(0, I/max(n/2, 1)), φ_f ~ U(0, 2π)
+    (Rahimi & Recht 2007), drawn once a family; of the heading its harmonics, cos kψ and sin kψ.
+    None where nothing of the family varies."""
     z = np.concatenate([v.reshape(-1, v.shape[-1]) for v in (_inputs(name, k) for k in campaigns)])
     width = z.std(0)
     if not (width > 1e-9).any():
@@ -218,9 +220,12 @@ def _of_motion(profile: Profile, knots: Knots) -> list[np.ndarray]:
 
 
 def _of_controls(profile: Profile, knots: Knots) -> list[np.ndarray]:
-    """Of every unit that drives n|n| and |n|u; of every angle δ sin δ u|u|, 1 - cos δ, and both in
-    the stream of each unit of `driven_by`. A rudder's force need not go on with its angle (stall,
-    play, a stop): sin(πδ/δ_max), times u|u| and in the same streams."""
+    """n|n| and |n|u of every unit that drives, n in rev/s; of every angle δ
+
+        sin δ u|u|,  1 - cos δ,  n|n| sin δ,  n|n| (1 - cos δ)   of each unit of `driven_by`,
+        sin(πδ/δ_max) u|u|,  sin(πδ/δ_max) n|n|                  of a rudder,
+
+    whose force need not grow with its angle (stall, play, a stop)."""
     u = knots.state[..., [1]]
     driving = [i for i, a in enumerate(profile.actuators) if a.kind in ("propeller", "thruster")]
     found = []

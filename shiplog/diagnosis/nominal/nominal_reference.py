@@ -148,7 +148,8 @@ def assume(
     model: Extended, setting: Setting, start: Start, record: Record, given: bool, inputs: Network
 ) -> Reference:
     """Of a network without a nominal campaign: noise, discrepancy and κ are estimated from these
-    voyages, and coefficients have their plausible spread.
+    voyages, and coefficients have their plausible spread: Λ = diag(K), η = the anchor, and K is
+    HELD_INFORMATION of causes' numbers, which have no nominal size.
 
     given    published coefficients, with a tenth of that spread, and not fitted to these voyages
     inputs   the network that trained on these voyages: the discrepancy is a function of its inputs

@@ -123,6 +123,7 @@ class _Part:
 
     @classmethod
     def of(cls, gram: np.ndarray, free: np.ndarray) -> _Part:
+        """M = G₁₁, g = G₁₀ and their rows F = `free` of a part's products G."""
         m, g = np.ascontiguousarray(gram[1:, 1:]), gram[1:, 0]
         return cls(m, g, m[free], g[free], m[np.ix_(free, free)])
 
@@ -186,7 +187,7 @@ class _EffectsProblem:
 
 
 def _inverse(matrix: np.ndarray) -> np.ndarray:
-    """Of a positive definite matrix. Raises np.linalg.LinAlgError where it is not."""
+    """A⁻¹ = L⁻ᵀ L⁻¹, A = L Lᵀ positive definite. Raises np.linalg.LinAlgError where it is not."""
     if not len(matrix):
         return matrix
     root = cholesky(matrix, lower=True, check_finite=False)

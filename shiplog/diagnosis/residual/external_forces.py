@@ -192,6 +192,7 @@ def masses(physics: MMG, values: np.ndarray) -> np.ndarray:
 
 @traced
 def _masses(physics, values):
+    """Forces of unit accelerations, (X, Y, N) = M (u̇, v̇, ṙ), one a row."""
     return body.forces_of(named(physics.names, values), physics.geometry, jnp.eye(3))
 
 
@@ -254,7 +255,7 @@ def _ranges(record: Record) -> list[np.ndarray]:
 
 
 def _resting(record: Record, physics: MMG, rows: np.ndarray) -> np.ndarray:
-    """[K] bool: no screw has turned for JETS_GONE_S."""
+    """max |n|/n_max ≤ STILL over the JETS_GONE_S before a node [K]: no screw has turned."""
     drives = [u.column for u in (*physics.geometry.propellers, *physics.geometry.thrusters)]
     ranges = _ranges(record)
     most = np.array([np.abs(ranges[i]).max() for i in drives])

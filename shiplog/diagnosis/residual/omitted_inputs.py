@@ -219,7 +219,7 @@ def _position(place: np.ndarray, psi: np.ndarray) -> Callable[[Indices], np.ndar
 
 
 def _time(share: np.ndarray, carried: np.ndarray) -> Callable[[Indices], np.ndarray]:
-    """t and t² times what carries the effect, t from -1 to 1 over the campaign."""
+    """t and t² times what carries the effect, t = 2 share - 1, from -1 to 1 over the campaign."""
     t = 2.0 * share - 1.0
     powers = np.stack((t, t**2), 1)
     return lambda at: _times(powers[at], carried)

@@ -124,6 +124,7 @@ def try_conventions(
 
 
 def _mean(simulator: ExtendedSimulator, cut: Windows) -> float:
+    """mean_w min(L_w, RUNAWAY)."""
     each = np.nan_to_num(simulator.losses(cut), nan=RUNAWAY, posinf=RUNAWAY)
     return float(np.minimum(each, RUNAWAY).mean())
 
@@ -190,6 +191,7 @@ def _of_actuators(profile: Profile, cut: Windows, read_as: Profile | None) -> It
 
 
 def _of_wind(cut: Windows, read_as: Profile | None) -> Iterator[Turned]:
+    """γ + π, -γ, γ ± π/2, γ - ψ of the wind's angle γ; its speed over each factor of SPEEDS."""
     key = "[sensors.wind]"
     yield Turned(
         "the wind direction as the one that it blows towards",
@@ -218,6 +220,8 @@ def _of_wind(cut: Windows, read_as: Profile | None) -> Iterator[Turned]:
 
 
 def _of_motion(profile: Profile, cut: Windows, read_as: Profile | None) -> Iterator[Turned]:
+    """-ψ, π/2 - ψ, ψ + π/2, ψ + π of the heading ψ, and ψ over each factor of ANGLES; -r and r over
+    each of RATES; then `_of_velocity`."""
     record = as_record(cut, profile, {}, {})
     seen = record.sighted
 
@@ -277,6 +281,8 @@ def _of_velocity(
     over_ground: bool,
     read_as: Profile | None,
 ) -> Iterator[Turned]:
+    """V over each factor of SPEEDS, and its parts turned round or exchanged: (V₁, -V₂), (V₂, V₁),
+    -V; or the velocity of the positions."""
     key = "[sensors.velocity]"
     velocity = seen.velocity
     for factor, words in SPEEDS.items():

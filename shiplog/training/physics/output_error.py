@@ -192,7 +192,8 @@ class _Problem:
         self._at: np.ndarray | None = None
 
     def solved(self, values: np.ndarray, bounds: tuple[np.ndarray, np.ndarray], most: int):
-        """Scipy's solution from `values` [P] on, within bounds, in at most `most` evaluations."""
+        """x̂ = argmin c(x) + |x|²: scipy's solution from θ = `values` [P] on, within bounds, in at
+        most `most` evaluations."""
         free, scale = self.free, self.spread[self.free]
         guess = (values - self.start)[free] / scale
         low, high = ((b - self.start)[free] / scale for b in bounds)
@@ -242,10 +243,12 @@ class _Problem:
         self._residual = np.concatenate((p, x, [rest]))
 
     def residual(self, x: np.ndarray) -> np.ndarray:
+        """r(x) [2P + 1], rᵀr = c(x) + |x|²."""
         self._evaluate(x)
         return self._residual
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
+        """J(x) [2P + 1, P], JᵀJ = H + I."""
         self._evaluate(x)
         return self._jacobian
 
