@@ -13,7 +13,7 @@ With z_s integrated out, all that numbers x = (d, w) need are the products of ea
 E = [e | J] where J has the columns Zₐ Φ_s behind those of J_s:
 
     G_s(λ) = Eᵀ C_s⁻¹ E,   C_s = R + Z₀ P₀ Z₀ᵀ + λ² Zₐ Q Zₐᵀ                         the likelihood
-    -2 log p(e | x, λ) = Σ_s ((1, -x) G_s (1, -x)ᵀ + log|C_s|)
+    -2 log p(e | x, λ) = Σ_s ((1, -x) G_s (1, -x)ᵀ + log|C_s|) + constant
 
 Three eliminations give G_s, each exact:
 

@@ -53,6 +53,7 @@ class Waves:
     phase: np.ndarray
 
     def __call__(self, z: np.ndarray) -> np.ndarray:
+        """√(2/F) cos((z - m)/s · ω_f + φ_f) [..., F]."""
         scaled = (z - self.middle) / self.width
         return np.sqrt(2.0 / len(self.phase)) * np.cos(scaled @ self.frequency + self.phase)
 

@@ -70,7 +70,9 @@ def converged(
 
     Without its discrepancy a model that describes the ship badly would be moved to coefficients,
     and the noise to sizes, that make up for it. A move after which the campaign is far less
-    probable is halved. A fit that does not converge is where the campaign was most probable.
+    probable is halved. A fit that does not converge is where the campaign was most probable:
+    argmax of log p(e | θ*) - ½ |(θ_run - θ*)/u|² over the iterates, of those on which the model
+    diverges on fewest segments.
 
     Raises np.linalg.LinAlgError where the model diverges on every segment from the start.
     """
@@ -122,6 +124,7 @@ class _Iterate:
 
     @property
     def converged(self) -> bool:
+        """gain < NEAR and max|x̂_θ| < CLOSE."""
         return self.solution.gain < NEAR and self.far < CLOSE
 
     def at_rest(self) -> Converged:
