@@ -4,23 +4,16 @@ from itertools import product
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize
 from scipy.stats import norm
 
 from shiplog.diagnosis.linear import linearisation
 from shiplog.diagnosis.linear.linear_segments import Linear, Path, Wide
 from shiplog.diagnosis.linear.segments import Cut
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, RAISED, Remainder, noise_prior
-from shiplog.diagnosis.nominal import nominal_fit
 from shiplog.diagnosis.residual import omitted_inputs
 from shiplog.training.physics import output_error
 
 NODES = 3  # J
-
-
-def positive(size: int, rng: np.random.Generator) -> np.ndarray:
-    root = rng.standard_normal((size, size))
-    return root @ root.T + np.eye(size)
 
 
 def test_a_step_towards_the_measurement_minimises_the_stated_sum():
@@ -51,26 +44,6 @@ def test_a_step_towards_the_measurement_minimises_the_stated_sum():
         step = np.linalg.lstsq(matrix, right, rcond=None)[0]
         assert found.start[s] == pytest.approx(path.start[s] + step[:6], abs=1e-9)
         assert found.acceleration[s].ravel() == pytest.approx(a + step[6:], abs=1e-9)
-
-
-def test_numbers_within_bounds_are_the_most_probable_ones_of_all():
-    """Of all numbers together, with the first two bounded; and the gain of those two over zero."""
-    rng = np.random.default_rng(3)
-    covariance = positive(5, rng)
-    free = np.array([1.5, -2.0, 0.3, 0.1, -0.4])
-    room = np.array([[-1.0, -0.5], [1.0, 0.5]])
-    information = np.linalg.inv(covariance)
-
-    def square(x: np.ndarray) -> float:
-        return float((x - free) @ information @ (x - free))
-
-    limits = [*zip(*room, strict=True), *[(None, None)] * 3]
-    wanted = minimize(square, np.zeros(5), method="L-BFGS-B", bounds=limits, tol=1e-14).x
-    found, gain = nominal_fit.most_probable_within(free, covariance, room)
-    assert found == pytest.approx(wanted, abs=1e-4)
-    marginal = np.linalg.inv(covariance[:2, :2])
-    off = found[:2] - free[:2]
-    assert gain == pytest.approx(0.5 * (free[:2] @ marginal @ free[:2] - off @ marginal @ off))
 
 
 def _nested(x: np.ndarray, y: np.ndarray, folds: np.ndarray) -> np.ndarray:
