@@ -116,7 +116,7 @@ def characteristics(
 ) -> Characteristics:  # fmt: skip
     """Estimated from the nominal voyages, linearised at their converged coefficients `at`."""
     made = nominal_pass(model, setting, start, record, at, numbers, pulled=not numbers)
-    columns, anchor, known = made.columns, made.anchor, made.columns.known
+    columns, anchor, K = made.columns, made.anchor, made.columns.known
     process_noise = noise_time(made.linear, made.accelerations, columns, anchor, at.process_noise)
     groups = groups_of(model, columns, made.families)
     sized = [family.columns for family in made.families.families]
@@ -126,7 +126,7 @@ def characteristics(
             likelihood.weighed(made.linear, process_noise), process_noise
         ).joined(made.accelerations)
         each = products(modes, made.rows, columns.unit, weight)
-        effects = voyage_effects.learn(each, known, anchor, list(groups.values()), sized)
+        effects = voyage_effects.learn(each, K, anchor, list(groups.values()), sized)
         if round_ == LEARNING_ROUNDS - 1:
             break
         # what parts disagree in is no noise, nor what a few segments are off by

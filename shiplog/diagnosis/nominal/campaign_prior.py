@@ -87,7 +87,7 @@ def learn(
     parts   G [1 + C, 1 + C] of each part, its own numbers integrated out; `voyages` v of each
     anchor  η [C]
     """
-    known = effects.size**-2.0
+    K = effects.size**-2.0
     count = len(np.unique(voyages))
     best, chosen = -np.inf, (float(np.sqrt(np.mean(np.square(VOYAGE_SPREADS)))), 1.0)
     tried = [of_voyages(parts, voyages, apart * effects.deviation) for apart in VOYAGE_SPREADS]
@@ -96,7 +96,7 @@ def learn(
         for i, (each, volumes) in enumerate(tried):
             for left, (gram, volume) in enumerate(zip(each, volumes, strict=True)):
                 kept = [g for j, g in enumerate(each) if j != left]
-                given = prior(kept, known, anchor, np.zeros(len(known)), share)
+                given = prior(kept, K, anchor, np.zeros(len(K)), share)
                 scores[i] += marginal(gram, *given) - 0.5 * volume
         whole = float(np.logaddexp.reduce(scores))
         if whole < best:

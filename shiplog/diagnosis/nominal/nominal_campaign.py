@@ -101,10 +101,10 @@ class Campaign:
     def prior_without(self, left_out: int, apart: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Λ [C, C] and η [C] (`campaign_prior.prior`), one nominal voyage left out; of the numbers
         of a voyage that is so far `apart`, a."""
-        known = self.effects.size**-2.0
-        count = 1 + len(known)
+        K = self.effects.size**-2.0
+        count = 1 + len(K)
         kept = [g[:count, :count] for i, g in enumerate(self.voyages) if i != left_out]
-        return prior(kept, known, self.reference.anchor, apart * self.effects.deviation,
+        return prior(kept, K, self.reference.anchor, apart * self.effects.deviation,
                      self.reference.counts)  # fmt: skip
 
 
@@ -122,7 +122,7 @@ def learn(
     """
     made = nominal_pass(model, setting, start, record, replace(at, path=found.path), numbers)
     columns, anchor, families = made.columns, made.anchor, made.families
-    process_noise, known = found.process_noise, made.columns.known
+    process_noise, K = found.process_noise, made.columns.known
     modes = likelihood.modes(likelihood.weighed(made.linear, process_noise), process_noise).joined(
         made.accelerations
     )
@@ -134,16 +134,16 @@ def learn(
     unit = np.append(columns.unit, np.ones(unseen.count))
     weight = np.where(made.linear.lost, 0.0, found.weight)
     every = products(whole, made.rows, unit, weight)
-    deviation, size = np.zeros(len(known)), known**-0.5
+    deviation, size = np.zeros(len(K)), K**-0.5
     for name, where in groups_of(model, columns, families).items():
         deviation[where] = found.deviation.get(name, voyage_effects.UNSEEN_DEVIATION)
     for family in families.families:
         size[family.columns] = found.size[family.name]
     effects = VoyageEffects(deviation, size)
-    count = 1 + len(known)
+    count = 1 + len(K)
     parts = [reduced(g[:count, :count], deviation)[0] for g in every]
     voyage = made.linear.cut.voyage[[rows[0] for rows in made.rows]]
-    own = np.zeros(len(known))
+    own = np.zeros(len(K))
     if len(np.unique(voyage)) == 1:  # its parts share its deviation, which another voyage has not
         voyage, own = np.arange(len(parts)), found.apart * deviation
     voyages, _ = campaign_prior.of_voyages(parts, voyage, found.apart * deviation)
@@ -210,18 +210,18 @@ def assumed(
     # have in common must not look like a difference
     found = characteristics(model, setting, start, record, at, numbers)
     whole = learn(model, setting, start, record, at, found, numbers)
-    columns, known = whole.reference.columns, whole.effects.size**-2.0
-    known[columns.base : columns.linearised] = HELD_INFORMATION
+    columns, K = whole.reference.columns, whole.effects.size**-2.0
+    K[columns.base : columns.linearised] = HELD_INFORMATION
     if given:
-        known[: columns.base] = nominal_reference.GIVEN**-2.0
+        K[: columns.base] = nominal_reference.GIVEN**-2.0
     made = replace(
-        whole.reference, information=np.diag(known), pull=known * whole.reference.anchor,
+        whole.reference, information=np.diag(K), pull=K * whole.reference.anchor,
         nominal=None, adapts=not given,
     )  # fmt: skip
     return replace(
         whole,
         reference=made,
-        effects=VoyageEffects(whole.effects.deviation, known**-0.5),
+        effects=VoyageEffects(whole.effects.deviation, K**-0.5),
         each=(),
         voyage=np.zeros(0),
     )

@@ -174,10 +174,10 @@ def assume(
     each = [modes.total((linear.cut.voyage == v).astype(float)) for v in names]
     kappa = inflation(np.stack(each) * np.outer(by, by), columns.known, anchor)
     # without a nominal campaign no cause has a nominal size
-    known = columns.known.copy()
-    known[columns.base : columns.linearised] = HELD_INFORMATION
+    K = columns.known.copy()
+    K[columns.base : columns.linearised] = HELD_INFORMATION
     return Reference(
-        model, setting, at.theta, columns, at.process_noise, wide_of(setting), np.diag(known),
+        model, setting, at.theta, columns, at.process_noise, wide_of(setting), np.diag(K),
         anchor, anchor, None, freedom(len(names)), adapts=not given, misfit=wrong,
         counts=1.0 / min(kappa, CAREFUL_KAPPA),
     )  # fmt: skip
