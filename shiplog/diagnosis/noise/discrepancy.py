@@ -75,8 +75,8 @@ class Family:
 
     def features(self, knots: Knots) -> np.ndarray:
         """I₃ ⊗ φ/√F [S, J, 3, 3F], φ_f = (feature - level)/scale: acceleration of each weight, in
-        units of the process noise. Features of a force from outside are turned into body axes, and
-        those of an even force, the first ones, have a √F of 1."""
+        units of the process noise. Features of the position and of an even force are turned into
+        body axes; those of an even force come first, and are not divided by √F."""
         values = (features(self.name, self.profile, self.waves, knots) - self.level) / self.scale
         plain = EVEN.get(self.name, 0)
         out = segment_nodes.in_each_channel(values[..., plain:] / np.sqrt(values.shape[-1] - plain))

@@ -13,13 +13,15 @@ are (`voyage_effects.reduced`; the same with a² D for c, `campaign_prior.of_voy
 
     G ← G - G_•1 D^½ (I + D^½ M D^½)⁻¹ D^½ G_1•,   of volume log|I + D^½ M D^½|.
 
-A trial is a further voyage of the ship, and the campaign counts for a share κ of itself (a power
-prior: Ibrahim & Chen 2000; Grünwald & van Ommen 2017). The prior of a trial's numbers is
+A trial is further voyages of the ship: its c and b are integrated out of its products likewise. Of
+what it has in common with the campaign, which counts for a share κ of itself (a power prior:
+Ibrahim & Chen 2000; Grünwald & van Ommen 2017), the prior is the campaign's posterior
 
-    x_trial ~ N(m, V + a² D),   V = (K + κ Σ M)⁻¹,  m = V (η + κ Σ g)        `campaign_prior.prior`
+    x ~ N(m, V + δ²),   V = (K + κ Σ_v M_v)⁻¹,  m = V (η + κ Σ_v g_v)        `campaign_prior.prior`
 
-The products that it is made of are about the point at which the campaign is linearised. Estimated
-in this order:
+with δ = 0, and a D^½ where the campaign is one voyage, whose parts then count as voyages: they
+share its c. The products are about the point at which the campaign is linearised. Estimated in this
+order:
 
     θ*, σ, q      Gauss-Newton on the campaign's log density, the noise in each round `nominal_fit`
     D, s, τ       expectation-maximisation; a grid for τ            `campaign_characteristics`

@@ -4,9 +4,11 @@ Voyages of one ship differ, and parts of one voyage differ: each voyage has numb
 of its parts x + c + b (nested random effects: Laird & Ware 1982), b ~ N(0, D), c ~ N(0, a² D). How
 far parts differ, D, is estimated in `voyage_effects`. Two more numbers predict each nominal voyage
 best from the others: how far voyages differ in that unit, a, and the weight of a voyage, κ. A trial
-is further voyages of the ship:
+is further voyages of the ship, with c and b of their own and the same x:
 
-    x_trial ~ N(m, V + a² D),   V = (K + κ Σ_v M_v)⁻¹,   m = V (η + κ Σ_v g_v)
+    x ~ N(m, V + diag(δ²)),   V = (K + κ Σ_v M_v)⁻¹,   m = V (η + κ Σ_v g_v)
+
+δ is the deviation of numbers of a trial that are not integrated out of its products.
 """
 
 from __future__ import annotations
