@@ -10,6 +10,7 @@ from shiplog.diagnosis.linear import linearisation
 from shiplog.diagnosis.linear.linear_segments import Linear, Path, Wide
 from shiplog.diagnosis.linear.segments import Cut
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, RAISED, Remainder, noise_prior
+from shiplog.diagnosis.nominal import voyage_effects
 from shiplog.diagnosis.residual import omitted_inputs
 from shiplog.training.physics import output_error
 
@@ -44,6 +45,42 @@ def test_a_step_towards_the_measurement_minimises_the_stated_sum():
         step = np.linalg.lstsq(matrix, right, rcond=None)[0]
         assert found.start[s] == pytest.approx(path.start[s] + step[:6], abs=1e-9)
         assert found.acceleration[s].ravel() == pytest.approx(a + step[6:], abs=1e-9)
+
+
+def test_a_step_of_expectation_maximisation_is_that_of_the_joint_posterior():
+    """Of x and the b of two columns in each of three parts, one Gaussian of nine numbers."""
+    rng = np.random.default_rng(4)
+    free, groups, sized = np.array([0, 2]), [np.array([0]), np.array([2])], [np.array([1])]
+    variance, known = np.array([0.3, 0.0, 0.7]), np.array([2.0, 1.0, 0.5])
+    pull, size = np.array([0.4, 0.0, -0.2]), 0.8  # variance of x of the column that is `sized`
+    known[1] = 1.0 / size
+    precision, right = np.zeros((9, 9)), np.zeros(9)
+    precision[:3, :3], right[:3] = np.diag(known), pull
+    grams = []
+    for part in range(3):
+        rows, e = rng.standard_normal((6, 3)), rng.standard_normal(6)
+        both = np.concatenate((e[:, None], rows), 1)
+        grams.append(both.T @ both)
+        columns = np.zeros((6, 9))
+        own = slice(3 + 2 * part, 5 + 2 * part)
+        columns[:, :3], columns[:, own] = rows, rows[:, free]
+        precision[own, own] += np.diag(1.0 / variance[free])
+        precision += columns.T @ columns
+        right += columns.T @ e
+    covariance = np.linalg.inv(precision)
+    mean = covariance @ right
+    squares = mean**2 + np.diagonal(covariance)
+    least = voyage_effects.LEAST_DEVIATION**2
+    wanted = [(squares[3 + c :: 2].sum() + least) / 4.0 for c in (0, 1)]
+    wanted.append((squares[1] + least) / 2.0)
+    problem = voyage_effects._EffectsProblem(
+        [voyage_effects._Part.of(g, free) for g in grams], free, known, pull, groups, sized
+    )
+    found, numbers = problem.step(np.log([0.3, 0.7, size]))
+    assert np.exp(found) == pytest.approx(wanted)
+    for part, x_b in enumerate(numbers):
+        own = np.array([mean[3 + 2 * part], 0.0, mean[4 + 2 * part]])
+        assert x_b == pytest.approx(mean[:3] + own)
 
 
 def _nested(x: np.ndarray, y: np.ndarray, folds: np.ndarray) -> np.ndarray:
