@@ -2,16 +2,15 @@
 
     e_s = J_s d + Z_s z_s + ε_s,  ε_s ~ N(0, R),  z_s = (δξ, a) ~ N(0, P),  P = diag(P₀, λ² Q)
 
-The acceleration is process noise: an Ornstein-Uhlenbeck process whose standard
+The start is free. The acceleration is process noise: an Ornstein-Uhlenbeck process whose standard
 deviation is estimated from the nominal campaign (Kennedy & O'Hagan 2001). Both are eliminated
 segment by segment, which leaves one small matrix over [e | J]:
 
     G_s = [e | J]ᵀ C_s⁻¹ [e | J],   C_s = R + Z_s P Z_sᵀ
 
-Symbols as in the room's opening; E stands for [e | J], Z₀ and Zₐ for the columns of Z by the start
-and by the acceleration at the nodes. Instrument noise is correlated from
-one observation to the next. Treated as white, it would imitate causes and make intervals too
-narrow.
+Instrument noise is correlated from one observation to the next. Treated as white, it would imitate
+causes and make intervals too narrow. Symbols as in the room's opening; E stands for [e | J], Z₀ and
+Zₐ for the columns of Z by the start and by the acceleration at the nodes.
 """
 
 from __future__ import annotations
