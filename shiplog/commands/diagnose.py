@@ -137,13 +137,13 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
     before = _nominal_windows(of) if nominal is not None else None
     if cut is not None and before is not None:
         simulator = run.extended(run.config.seeds[0], recorded)
-        if why := sign_conventions.at_once(simulator, cut, before, profile):
+        if why := sign_conventions.sufficient_convention(simulator, cut, before, profile):
             return DiagnosedTrial(
                 answer.other_convention(run, recorded, before_effect, why, of.against, notes), out
             )
     lacking = baseline_check.lacking(run, store, profile) if nominal is not None else run.lacks
-    barred = contradicted_causes.barred(contradicted.channels(of.against), profile)
-    decided = trial_decision.decided(
+    barred = contradicted_causes.barred_causes(contradicted.channels(of.against), profile)
+    decided = trial_decision.decide_trial(
         run, nominal, recorded, cut, causes, lacking, reach, barred, before, profile
     )
     tried, judge = decided.trial, decided.judge
@@ -152,7 +152,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
     notes += [lacking] if lacking else []
     whole = tried.covering(decided.point)
     reach("external forces")
-    external, out_of_reach = error_location.external(
+    external, out_of_reach = error_location.find_external_forces(
         tried, decided.point, whole, decision.fit.remainder, nominal
     )
     tried = tried.leaving_out(out_of_reach)
@@ -171,7 +171,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
         lost = exchanged_twins.explains(tried, decided.point, decision, numbers, profile)
     if lost:
         dropped |= {n.cause.label: answer.none_named(lost) for n in decision.named}
-        decision, found = decisions.untold(decision), None
+        decision, found = decisions.without_simulation(decision), None
     elif held and decision.verdict in answer.OPEN and held.hint:
         notes.append(held.hint)
     simulated = (tried, decision)
@@ -191,9 +191,9 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
         notes,
         external,
         tried.grid.seconds,
-        error_location.uncovered(run, store, names, profile, held.cut) if held else (),
-        error_location.by_channel(held) if held else (),
-        error_location.depends_on(simulated[0], simulated[1].nothing, whole),
+        error_location.uncovered_windows(run, store, names, profile, held.cut) if held else (),
+        error_location.errors_by_channel(held) if held else (),
+        error_location.find_omitted_inputs(simulated[0], simulated[1].nothing, whole),
         alone,
         of.against,
     )

@@ -126,7 +126,7 @@ def _identify(run: RunFolder, ready: Prepared) -> tuple[list[str], dict]:
 
     held_out = _hold_out(ready, refit, settings.folds)
     notes += held_out.sentences(ready, found, settings.folds)
-    notes += identifiability.note(
+    notes += identifiability.describe(
         found, ready.start.names, ready.start.spread, (ready.start.low, ready.start.high),
         lambda name: ready.start.entry(name).meaning,
     )  # fmt: skip

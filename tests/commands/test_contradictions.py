@@ -105,15 +105,17 @@ def test_a_contradiction_of_a_short_stretch_bars_the_causes_of_its_channel_alone
     assert half.share == pytest.approx(0.1, rel=0.05)
     assert contradicted.of(there, ["trip_3[40:80]"]) == ()
     profile = there.profile(["trip_3"])
-    barred = contradicted_causes.barred(["wind"], profile)
+    barred = contradicted_causes.barred_causes(["wind"], profile)
     assert set(barred) == {
         "wind_force", "wind_direction_offset", "wind_speed_scale", "clock_offset"
     }  # fmt: skip
     assert {"rudder_offset", "rudder_lag"} <= set(
-        contradicted_causes.barred(["rudder_port"], profile)
+        contradicted_causes.barred_causes(["rudder_port"], profile)
     )
-    assert {"current", "fouling"} <= set(contradicted_causes.barred(["surge"], profile))
-    assert len(contradicted_causes.barred(["ship"], profile)) > 15  # of no channel: every cause
+    assert {"current", "fouling"} <= set(contradicted_causes.barred_causes(["surge"], profile))
+    assert (
+        len(contradicted_causes.barred_causes(["ship"], profile)) > 15
+    )  # of no channel: every cause
 
 
 def test_diagnose_does_not_judge_voyages_of_another_profile(store, published, tmp_path):

@@ -49,7 +49,7 @@ def coasting(segments_on: tuple[int, ...] = ()) -> tuple[Cut, Path, np.ndarray]:
 @pytest.mark.parametrize(("substeps", "many"), [(1, 1), (2, 1), (4, 2), (8, 4)])
 def test_steps_between_nodes_follow_trainings(substeps, many):
     """Stable where training is: |λ| up to 2n a second there, up to one over the step here."""
-    assert linearisation.finer(Stiff(substeps), 0.2) == many
+    assert linearisation.stable_steps(Stiff(substeps), 0.2) == many
     assert 2.0 * substeps * 0.2 / many <= 1.0
 
 

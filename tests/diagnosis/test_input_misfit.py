@@ -75,7 +75,9 @@ def nats(linear: Linear, own: input_misfit.Misfit | None) -> float:
 def learned(linear: Linear) -> input_misfit.Misfit:
     modes = likelihood.modes(likelihood.weighed(linear, PROCESS_NOISE), PROCESS_NOISE)
     one = np.ones(1)
-    return input_misfit.of(network(), linear.cut, GRID, modes, one, one, PROCESS_NOISE.acceleration)
+    return input_misfit.estimate(
+        network(), linear.cut, GRID, modes, one, one, PROCESS_NOISE.acceleration
+    )
 
 
 def test_what_it_bends_the_network_by_is_its_acceleration():

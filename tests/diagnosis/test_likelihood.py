@@ -294,7 +294,7 @@ def test_sizes_are_learnt_from_draws_of_the_model():
     e = np.einsum("sbcz,sz->sbc", given.z, z) + given.j @ d + noise
     e[~given.cut.used] = 1e3  # nobody looks there
     begin = replace(PROCESS_NOISE, noise=NOISE * 3.0, acceleration=PROCESS_NOISE.acceleration / 3.0)
-    found = noise_estimate.learnt(replace(given, e=e), d, begin, rounds=25)
+    found = noise_estimate.estimate(replace(given, e=e), d, begin, rounds=25)
     assert found.noise == pytest.approx(NOISE, rel=0.15)
     assert found.acceleration == pytest.approx(PROCESS_NOISE.acceleration, rel=0.15)
     assert found.time == PROCESS_NOISE.time and (found.start == PROCESS_NOISE.start).all()
@@ -315,7 +315,7 @@ def test_sizes_learnt_are_the_likeliest():
     begin = replace(
         PROCESS_NOISE, noise=NOISE * 10.0, acceleration=PROCESS_NOISE.acceleration / 10.0
     )
-    found = noise_estimate.learnt(given, np.zeros(2), begin, rounds=5)
+    found = noise_estimate.estimate(given, np.zeros(2), begin, rounds=5)
 
     def log_density(sizes):
         tried = replace(found, noise=sizes[:6], acceleration=sizes[6:])
@@ -343,14 +343,14 @@ def test_colour_of_the_noise_is_learnt_from_draws_of_it():
     e = np.einsum("sbcz,sz->sbc", given.z, z) + given.j @ d + noise.reshape(given.e.shape)
     drawn, found = replace(given, e=e), PROCESS_NOISE
     for _ in range(4):
-        found = noise_estimate.learnt(drawn, d, found, rounds=6)
+        found = noise_estimate.estimate(drawn, d, found, rounds=6)
     assert found.coloured[5] == pytest.approx(0.8, abs=0.1) and found.fade[5] == 4.0
     assert (found.coloured[:5] <= 0.2).all()
     assert found.noise == pytest.approx(NOISE, rel=0.1)
     holes = replace(
         drawn, cut=replace(drawn.cut, used=drawn.cut.used & (np.arange(15) != 7)[:, None])
     )
-    assert (noise_estimate.learnt(holes, d, PROCESS_NOISE, rounds=1).coloured == 0.0).all()
+    assert (noise_estimate.estimate(holes, d, PROCESS_NOISE, rounds=1).coloured == 0.0).all()
 
 
 def test_one_campaign_is_believed_less_where_voyages_disagree():

@@ -34,7 +34,7 @@ def test_what_a_rival_imitates_does_not_count(counts):
     alone = np.eye(3) / counts + 0.25 * np.outer(x[:, 0], x[:, 0])
     with_rival = alone + np.outer(x[:, 2], x[:, 2])
     expected = 0.5 * y @ np.linalg.inv(with_rival) @ y
-    assert next_manoeuvre.apart(trial, g, named, "other") == pytest.approx(expected, rel=1e-6)
+    assert next_manoeuvre.separation(trial, g, named, "other") == pytest.approx(expected, rel=1e-6)
 
 
 def test_each_manoeuvre_is_within_what_the_ship_did():

@@ -9,7 +9,7 @@ import straight
 from straight import CAUSES, SETTING
 
 from shiplog.diagnosis.nominal import nominal_fit
-from shiplog.diagnosis.nominal.nominal_fit import within
+from shiplog.diagnosis.nominal.nominal_fit import most_probable_within
 from shiplog.models.starting_values import Start
 
 BEGIN = 3.0  # of the coefficient; its true value is 0
@@ -23,7 +23,7 @@ def test_numbers_within_bounds_are_where_none_may_gain_any_more(seed):
     information = rows.T @ rows
     free = rng.standard_normal(7)
     room = np.stack((-rng.uniform(0.0, 0.6, 4), rng.uniform(0.0, 0.6, 4)))
-    found, gain = within(free, np.linalg.inv(information), room)
+    found, gain = most_probable_within(free, np.linalg.inv(information), room)
     slope = information @ (free - found)
     low, high = (np.isclose(found[:4], end, atol=1e-8) for end in room)
     assert (found[:4] >= room[0] - 1e-8).all() and (found[:4] <= room[1] + 1e-8).all()
@@ -44,7 +44,9 @@ def test_without_a_bound_in_reach_they_are_the_free_ones():
     rng = np.random.default_rng(1)
     rows = rng.standard_normal((30, 5))
     free = rng.standard_normal(5)
-    found, gain = within(free, np.linalg.inv(rows.T @ rows), np.array([[-9.0] * 3, [9.0] * 3]))
+    found, gain = most_probable_within(
+        free, np.linalg.inv(rows.T @ rows), np.array([[-9.0] * 3, [9.0] * 3])
+    )
     assert found == pytest.approx(free)
     information = np.linalg.inv(np.linalg.inv(rows.T @ rows)[:3, :3])
     assert gain == pytest.approx(0.5 * free[:3] @ information @ free[:3])

@@ -90,7 +90,7 @@ def test_each_instant_counts_once_and_by_the_better_known():
         PROCESS_NOISE,
         rested((700,), (0,)),
     )
-    keep = residual_acceleration.once(found)
+    keep = residual_acceleration.unique_instants(found)
     rows = np.sort(found.rows[keep])
     assert np.diff(rows).min() >= 10  # knots are 20 rows apart; no pair is nearer than half of it
     assert rows[0] == 0

@@ -178,7 +178,7 @@ SLIPS = {
 def test_each_slip_of_a_profile_is_the_best_convention(words):
     cut, model = SLIPS[words](), as_sailed()
     own = float(np.mean(model.losses(cut)))
-    found = sign_conventions.tried(model, cut, sailed())
+    found = sign_conventions.try_conventions(model, cut, sailed())
     assert found.words == words
     assert found.key.startswith("`")
     assert sign_conventions.explains(found, own, own, sign_conventions._hold(cut), 1.0)
@@ -190,14 +190,14 @@ def test_a_course_in_degrees_that_are_called_radians_is_what_the_positions_contr
         course = np.degrees(np.arctan2(seen.velocity[:, 1], seen.velocity[:, 0]))
         return replace(seen, velocity=np.stack((speed * np.cos(course), speed * np.sin(course)), 1))
 
-    found = sign_conventions.tried(as_sailed(), recorded(wrong), sailed())
+    found = sign_conventions.try_conventions(as_sailed(), recorded(wrong), sailed())
     assert found.words == sign_conventions.INSTEAD
 
 
 def test_a_sound_trial_has_no_convention_that_explains_it():
     cut, model = sailed(), as_sailed()
     own = float(np.mean(model.losses(cut)))
-    found = sign_conventions.tried(model, cut, sailed())
+    found = sign_conventions.try_conventions(model, cut, sailed())
     assert not sign_conventions.explains(found, own, own, sign_conventions._hold(cut), 1.0)
 
 
@@ -208,14 +208,14 @@ def test_of_two_units_that_err_alike_the_one_that_the_profile_states_is_said(uni
     text = sailing.PROFILE.replace('units = ["m/s", "deg"]', f'units = ["{unit}", "deg"]')
     between = 0.97 * {"kn": KNOTS, "km/h": 1.0 / 3.6}[unit]
     cut = blown(lambda w: w * np.array([between, 1.0]))
-    found = sign_conventions.tried(as_sailed(), cut, sailed(), sailing.profile(text))
+    found = sign_conventions.try_conventions(as_sailed(), cut, sailed(), sailing.profile(text))
     assert found.words == f"the wind speed taken as m/s that are called {spoken}"
 
 
 def test_a_convention_that_the_nominal_voyages_have_too_is_left_out():
     """A model that errs less with a vane mirrored, in its own campaign, too, is no news of one."""
     cut = SLIPS["the wind's angle mirrored, port for starboard"]()
-    found = sign_conventions.tried(as_sailed(), cut, cut)
+    found = sign_conventions.try_conventions(as_sailed(), cut, cut)
     assert "mirrored" not in found.words
 
 

@@ -142,7 +142,9 @@ def test_a_sign_that_is_the_other_way_round_is_found(sea, words):
     """Each is its own inverse: turned back, the model is as good as it was. Its current is in it:
     what a wrong sign does must not drown in what else is wrong."""
     cut, model = sea.done.held.cut, sea.done.after
-    (turned,) = [w for s, w in sign_conventions.other(PROFILE, cut) if words in s]
+    (turned,) = [
+        w for s, w in sign_conventions.windows_under_conventions(PROFILE, cut) if words in s
+    ]
     found, loss = sign_conventions.best(model, turned)
     assert words in found
     assert loss == pytest.approx(model.losses(cut).mean(), rel=1e-4)
@@ -210,7 +212,7 @@ def test_the_manoeuvre_that_separates_is_the_seamans(sea):
     grams = dict(
         zip(
             (m.text(1.0) for m in next_manoeuvre.MANOEUVRES),
-            next_manoeuvre.sailed(trial, {}),
+            next_manoeuvre.products_of_manoeuvres(trial, {}),
             strict=True,
         )
     )
@@ -219,7 +221,8 @@ def test_the_manoeuvre_that_separates_is_the_seamans(sea):
     def worth(label, numbers, other):
         one = replace(sea.done.decision.named[0], cause=by[label], numbers=np.array(numbers))
         return {
-            w.split(",")[0]: next_manoeuvre.apart(trial, g, one, other) for w, g in grams.items()
+            w.split(",")[0]: next_manoeuvre.separation(trial, g, one, other)
+            for w, g in grams.items()
         }
 
     lag = worth("rudder_lag", [2.0], "rudder_delay")

@@ -217,7 +217,7 @@ def test_where_the_others_run_away_without_a_cause_nothing_is_left(compass, monk
     two = replace(decision, named=(one, other), fit=fit)
     gone = Found("heading_offset", -np.inf, 1.0, {one.cause.label: one.numbers})
     monkeypatch.setattr(decisions, "converge", lambda *_, **__: (decision.fit.point, gone))
-    left = decisions.without(trial, two, other)
+    left = decisions.without_cause(trial, two, other)
     assert left.named == () and left.verdict == "none"
     assert left.fit is decision.nothing
 

@@ -66,7 +66,7 @@ def found(exact) -> Identified:
 
 def notes(found: Identified, names, spread, bounds=None) -> list[str]:
     limits = bounds or (np.full(len(names), -np.inf), np.full(len(names), np.inf))
-    return identifiability.note(found, names, spread, limits, lambda name: f"the {name}")
+    return identifiability.describe(found, names, spread, limits, lambda name: f"the {name}")
 
 
 # ---------------------------------------------------------------- what is found
@@ -82,7 +82,7 @@ def test_exact_data_give_the_true_values_back(found):
 def test_what_the_data_never_touch_stays_where_it_started(found):
     assert found.values[2] == START[2]
     assert found.standard_error[2] == pytest.approx(WIDE[2])
-    assert identifiability.silent(found, WIDE).tolist() == [False, False, True]
+    assert identifiability.undetermined(found, WIDE).tolist() == [False, False, True]
     (sentence,) = notes(found, Boat.names, WIDE)
     assert sentence == "These data say nothing about silent: they stand where they started."
 
@@ -128,7 +128,7 @@ def test_parameters_that_only_show_together_are_named_as_a_pair(kind, sign):
     assert {"sum": a + b, "difference": a - b, "product": a * b}[kind] == pytest.approx(
         {"sum": 0.3, "difference": 0.1, "product": 0.02}[kind], rel=0.1
     )
-    ((i, j, value),) = identifiability.trades(both)
+    ((i, j, value),) = identifiability.correlated_pairs(both)
     assert (i, j) == (0, 1) and abs(value) > 0.9
     sentence = notes(both, Pair.names, spread)[0]
     assert "the a (a) and the b (b) trade against each other" in sentence
@@ -143,7 +143,7 @@ def test_the_strongest_trades_are_named_and_the_rest_counted():
     shared[0] = shared[:, 0] = 0.0  # held: no error, no correlation
     free = np.array([False, True, True, True, True])
     made = Identified(np.zeros(5), shared, free, 1.0, (1.0, 1.0), 1, True, "converged")
-    pairs = identifiability.trades(made)
+    pairs = identifiability.correlated_pairs(made)
     assert len(pairs) == 6 and pairs[0] == (1, 3, pytest.approx(-0.95))
     assert not identifiability.correlations(made)[0].any()
     names = ("p", "q", "r", "s", "t")

@@ -1,4 +1,4 @@
-"""Linearised segments: what was measured less what was simulated, and how all numbers change it."""
+"""Linearised segments: e_s = J_s d + Z_s z_s + ε_s, and the path that each is linear about."""
 
 from __future__ import annotations
 
@@ -11,18 +11,19 @@ from shiplog.diagnosis.linear.segments import Cut, SegmentGrid
 
 @dataclass(frozen=True)
 class Path:
-    """Where each segment was linearised: start [S, 6] and knots [S, 3, J] of acceleration."""
+    """Where each segment was linearised: start ξ* [S, 6] and acceleration a* [S, 3, J] at the
+    nodes, m/s² and rad/s²."""
 
     start: np.ndarray
     acceleration: np.ndarray
 
     def at_nodes(self, g: SegmentGrid) -> np.ndarray:
+        """Σⱼ hⱼ(tₖ) aⱼ*: the acceleration at the K instants of the steps [S, K, 3]."""
         return np.einsum("scj,kj->skc", self.acceleration, g.weights)
 
     @property
     def known(self) -> np.ndarray:
-        """[S, 6 + 3J] what a linearisation puts back: the start is free, and its own value its
-        mean."""
+        """z* = (0, a*) [S, 6 + 3J]: the start counts from ξ*, the acceleration from zero."""
         return np.concatenate(
             (np.zeros_like(self.start), self.acceleration.reshape(len(self.acceleration), -1)), 1
         )
@@ -30,12 +31,14 @@ class Path:
 
 @dataclass(frozen=True)
 class Linear:
-    """Segments linearised: residual = Z z + J d + noise.
+    """Segments linearised: e = J d + Z z + ε.
 
-    e   [S, B, 6]       measured less simulated, with the path's own z put back
-    z   [S, B, 6, Z]    by initial state (6) and knots (3J)
-    j   [S, B, 6, C]    by θ
-    lost [S]            bool: the model diverges there; rows of zeros, nothing of it is used
+    e   [S, B, 6]           y - y* + Z z*: measured less simulated, with the path's own z* put back
+    z   [S, B, 6, 6 + 3J]   Z: by the start (6), then by the accelerations, channel by channel (3J)
+    j   [S, B, 6, C]        J: by θ, of the simulation less of the measurement
+    lost [S]                bool: the model diverges there; rows of zeros, nothing of it is used
+
+    Rows have the units of `channels.STATE`: m, m/s, rad, rad/s.
     """
 
     cut: Cut
@@ -56,12 +59,12 @@ class Linear:
         return Linear(self.cut.pick(keep), path, *parts)
 
     def less(self, accelerations: np.ndarray) -> Linear:
-        """Without what `accelerations` [S, 3J] at the knots does to the observations."""
+        """e - Zₐ a: without what `accelerations` a [S, 3J] at the nodes do to the observations."""
         return replace(self, e=self.e - np.einsum("sbcz,sz->sbc", self.z[..., 6:], accelerations))
 
     def less_numbers(self, numbers: np.ndarray, accelerations: np.ndarray) -> Linear:
-        """Residuals without the effect of the numbers [S, C + W] of each segment, SI: C of the
-        columns of `j`, then W of accelerations [S, 3J, W] at the nodes."""
+        """e - J d - Zₐ Φ w, with other numbers (d, w) [S, C + W] in each segment, SI; Φ
+        `accelerations` [S, 3J, W] of each weight at the nodes."""
         count = self.j.shape[-1]
         e = self.e - np.einsum("sbnc,sc->sbn", self.j, numbers[:, :count])
         return replace(self, e=e).less(np.einsum("szw,sw->sz", accelerations, numbers[:, count:]))
@@ -79,8 +82,8 @@ def _both(one: object, other: object, name: str) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Wide:
-    """How freely a path may be pulled: noise of one observation [6], of the start [6], and of
-    the acceleration's knots [3]."""
+    """How freely a path may be fitted to its measurement: standard deviations of one observation
+    [6], of the start [6], and of the acceleration at each node [3], SI."""
 
     noise: np.ndarray
     start: np.ndarray

@@ -2,8 +2,10 @@
 
 A free rollout of a minute soon leaves the path of a ship that turns easily, and its derivatives are
 then those of another voyage. Each segment is therefore first fitted to the measurement, by its
-initial state and a slowly varying acceleration. About this smoothed path the simulation is linear:
-y ≈ y* + Z (z - z*) + J d.
+initial state and a slowly varying acceleration, z = (δξ, a). About this smoothed path the
+simulation is linear:
+
+    y ≈ y* + Z (z - z*) + H d,   d = θ - θ*
 
 Where training divided a second into several steps, the time between two nodes is divided too. A
 segment in which the model still diverges is left out and counted (`Linear.lost`).
@@ -47,7 +49,7 @@ class Smooth(Physical, Protocol):
 # --- integration: two-step Adams-Bashforth, one evaluation a step ---------------------------------
 
 
-def finer(model: Smooth, step: float) -> int:
+def stable_steps(model: Smooth, step: float) -> int:
     """Steps between two nodes with which the integration is as stable as in training.
 
     On the negative real axis the explicit Euler method is stable for |λ| h up to 2, two-step
@@ -58,7 +60,8 @@ def finer(model: Smooth, step: float) -> int:
 
 
 def _between(values: np.ndarray, many: int) -> np.ndarray:
-    """Of values [S, K, ...] at nodes those at [S, (K - 1) many + 1, ...], straight in between."""
+    """v(k + i/m) = vₖ + i/m (vₖ₊₁ - vₖ), i < m: of values [S, K, ...] those at m = `many` instants
+    for one, [S, (K - 1) m + 1, ...]."""
     if many == 1:
         return values
     part = np.arange(many).reshape(1, 1, many, *[1] * (values.ndim - 2)) / many
@@ -69,12 +72,17 @@ def _between(values: np.ndarray, many: int) -> np.ndarray:
 
 
 def _ab2(values: Array, before: Array, first) -> Array:
+    """(3/2) fₖ - (1/2) fₖ₋₁, the slope of a step of Adams-Bashforth; f₀ (Euler) of the first."""
     return jnp.where(first, values, 1.5 * values - 0.5 * before)
 
 
 @traced
 def states_along(model, theta, start, acceleration, driven, step):
-    """States [S, K, 6] at the nodes, an `acceleration` [S, K, 3] added."""
+    """xₖ₊₁ = xₖ + h ((3/2) fₖ - (1/2) fₖ₋₁), fₖ = ẋ(xₖ, uₖ; θ) + (0, a_u, 0, a_v, 0, a_r)ₖ: states
+    [S, K, 6] from `start` [S, 6] on, `step` h [s], with an `acceleration` a [S, K, 3] added.
+
+    driven   [S, K, A + 3]  uₖ: actuators, share of the campaign, true wind
+    """
 
     def advance(carry, along):
         state, before, first = carry
@@ -91,7 +99,7 @@ def states_along(model, theta, start, acceleration, driven, step):
 
 @traced
 def _slopes(model, theta, states, driven):
-    """∂ν̇ by state [3, 6, S K], by what drives [3, D, S K] and by θ [3, P, S K].
+    """∂f/∂x [3, 6, S K], ∂f/∂u [3, D, S K] and ∂f/∂θ [3, P, S K], f = (u̇, v̇, ṙ) of the model.
 
     In single precision, in half the time: six digits of a slope are more than a linearisation has,
     and what it is about is simulated in double. Sample by sample last, each with a θ of its own,
@@ -116,15 +124,16 @@ def _slopes(model, theta, states, driven):
 
 
 def first_path(model: Smooth, theta: np.ndarray, segments: Cut, g: SegmentGrid) -> Path:
-    """From the measured path itself: its acceleration less the model's."""
+    """ξ* = y₀ - (y₁ - y₀)/2 and aⱼ* = Δν/Δt - f(x, u; θ) at the nodes: the measured acceleration,
+    by differences of the means of bins, less the model's at the measured state."""
     y = segments.y
     centre = (np.arange(g.bins) + 0.5) * g.bin
-    knots = np.arange(g.knots) * g.knot
+    nodes = np.arange(g.knots) * g.knot
     velocity = y[..., [1, 3, 5]]
     change = np.diff(velocity, axis=1) / g.bin
     at = 0.5 * (centre[1:] + centre[:-1])
-    accelerated = resampled(at, change, knots)
-    states = resampled(centre, y, knots)
+    accelerated = resampled(at, change, nodes)
+    states = resampled(centre, y, nodes)
     per = round(g.knot / (g.step * g.every))
     modelled = accelerations(model, theta, states, segments.driven[:, ::per])
     start = y[:, 0] - 0.5 * (y[:, 1] - y[:, 0])
@@ -134,7 +143,8 @@ def first_path(model: Smooth, theta: np.ndarray, segments: Cut, g: SegmentGrid) 
 def accelerations(
     model: Smooth, theta: np.ndarray, states: np.ndarray, driven: np.ndarray
 ) -> np.ndarray:
-    """ν̇ [S, n, 3] at states [S, n, 6]."""
+    """f(x, u; θ) [S, n, 3], the model's (u̇, v̇, ṙ) in m/s² and rad/s², at states x [S, n, 6] and
+    what drives u [S, n, A + 3]."""
     modelled = np.empty((*states.shape[:2], 3))
     for part, filled in chunks(len(states)):
         found = _accelerations(model, theta, filled(states), filled(driven))
@@ -148,7 +158,8 @@ def _accelerations(model, theta, states, driven):
 
 
 def resampled(at: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Linear in between, constant beyond; values [S, n, c] at times [n]."""
+    """v(t) = vᵢ + (t - tᵢ)/(tᵢ₊₁ - tᵢ) (vᵢ₊₁ - vᵢ) at the times `wanted` [m], constant beyond; of
+    values [S, n, c] at times `at` [n]."""
     right = np.clip(np.searchsorted(at, wanted), 1, len(at) - 1)
     part = np.clip((wanted - at[right - 1]) / (at[right] - at[right - 1]), 0.0, 1.0)
     left = values[:, right - 1]
@@ -165,10 +176,15 @@ def pulled(
     rounds: int = MOST_PULLS,
     about: np.ndarray | None = None,
 ) -> Path:
-    """Each segment's path onto what was measured: Gauss-Newton in start and knots, until it
-    converges or for so many rounds.
+    """The path of each segment that is most probable given its measurement: Gauss-Newton in
+    z = (δξ, a), until it converges or for so many rounds. It minimises
 
-    about   [S, 3J] acceleration at the knots that is expected of it; none unless given
+        Σ_b ((y_b - y_b(z))/σ)² + Σ (δξ/σ₀)² + Σⱼ ((aⱼ - āⱼ)/σₐ)²,   σ, σ₀, σₐ of `wide`,
+
+    where each step's δξ counts from the start before it: a start far away is not held back.
+
+    theta   θ* [C]
+    about   ā [S, 3J] acceleration at the nodes that is expected of it; zero unless given
     """
     path = path or first_path(model, theta, segments, g)
     for _ in range(rounds):
@@ -180,9 +196,9 @@ def pulled(
 
 
 def ahead(linear: Linear, d: np.ndarray, wide: Wide, about: np.ndarray | None = None) -> Path:
-    """Where a linearisation expects a path to be pulled once θ has moved by d [C], by one step of
-    Gauss-Newton: nothing is simulated, and what is not linear shows when it is linearised there.
-    `about` as in `pulled`."""
+    """Where a linearisation expects `pulled` to end once θ has moved by d [C]: one step of
+    Gauss-Newton from the gap y - y* - J d = e - J d - Z z*. Nothing is simulated; what is not
+    linear shows when the model is linearised there. `about` as in `pulled`."""
     gap = linear.e - linear.j @ d - np.einsum("sbcz,sz->sbc", linear.z, linear.path.known)
     return _closer(linear.path, gap, linear.z, linear.cut.used, wide, about)[0]
 
@@ -191,9 +207,18 @@ def _closer(
     path: Path, gap: np.ndarray, z: np.ndarray, used: np.ndarray, wide: Wide,
     about: np.ndarray | None,
 ) -> tuple[Path, float]:  # fmt: skip
-    """One step of Gauss-Newton, and the most nats that it is expected to gain in a segment: gap
-    [S, B, 6] is what was measured less what was simulated. A path that diverged stays where it
-    was."""
+    """One step of Gauss-Newton, and the most nats that it is expected to gain in a segment.
+
+        N = Zᵀ R⁻¹ Z + P⁻¹,   q = Zᵀ R⁻¹ (y - y*) - P⁻¹ (z* - (0, ā)),   δz = N⁻¹ q,
+        gain = ½ δzᵀ q
+
+    with R = diag(σ²) and P = diag(σ₀², σₐ²) of `wide`.
+
+    gap   y - y* [S, B, 6], measured less simulated
+    z     Z [S, B, 6, 6 + 3J]
+
+    A path that diverged stays where it was.
+    """
     count, _, _, size = z.shape
     away = np.logical_not(np.isfinite(gap).all((1, 2)) & np.isfinite(z).all((1, 2, 3)))
     if away.any():
@@ -201,20 +226,20 @@ def _closer(
         gap[away], z[away] = 0.0, 0.0
     prior = np.concatenate((wide.start, np.repeat(wide.acceleration, path.acceleration.shape[-1])))
     weight = np.where(used, 1.0 / wide.noise, 0.0)
-    scaled = (z * weight[..., None]).reshape(count, -1, size)
-    # the start is free about where it stands, the knots about what is expected of them
-    known = path.known
+    Z = (z * weight[..., None]).reshape(count, -1, size)  # R^-½ Z
+    # the start is free about where it stands, the nodes about what is expected of them
+    off = path.known
     if about is not None:
-        known[:, 6:] -= about
-    turned = np.swapaxes(scaled, 1, 2)
-    normal = turned @ scaled + np.diag(prior**-2.0)
-    pull = (turned @ (gap * weight).reshape(count, -1, 1))[..., 0] - known * prior**-2.0
-    pull[away] = 0.0  # else an acceleration that is not finite would be the gain of all
-    step = np.linalg.solve(normal, pull[..., None])[..., 0]
+        off[:, 6:] -= about
+    Zt = np.swapaxes(Z, 1, 2)
+    N = Zt @ Z + np.diag(prior**-2.0)
+    q = (Zt @ (gap * weight).reshape(count, -1, 1))[..., 0] - off * prior**-2.0
+    q[away] = 0.0  # else an acceleration that is not finite would be the gain of all
+    step = np.linalg.solve(N, q[..., None])[..., 0]
     closer = Path(
         path.start + step[:, :6], path.acceleration + step[:, 6:].reshape(path.acceleration.shape)
     )
-    return closer, 0.5 * float((step * pull).sum(1).max(initial=0.0))
+    return closer, 0.5 * float((step * q).sum(1).max(initial=0.0))
 
 
 def linear(
@@ -227,12 +252,13 @@ def linear(
     observed: np.ndarray,
     wide: Wide | None = None,
 ) -> Linear:
-    """Around a path, by all of θ, of which the last Q are causes' numbers.
+    """e = y - y* + Z z*,  J = H - O: the segments about a path, by all of θ [C], of which the last
+    Q are causes' numbers.
 
-    moved   [S, K, D, Q]  derivatives of actuators and wind by the causes' numbers
-    observed  [S, B, 6, Q]  derivatives of the measurements by them
-    wide    standard deviation of the path about its measurement: a path RUN_AWAY times that
-            away has diverged; where it is not given, the span of the segments
+    moved     [S, K, D, Q]  ∂u/∂θ: derivatives of actuators and wind by the causes' numbers
+    observed  [S, B, 6, Q]  O = ∂y/∂θ: derivatives of the measurements by them
+    wide      standard deviation of the path about its measurement: a path RUN_AWAY times that
+              away has diverged; where it is not given, the span of the segments
     """
     y, columns = simulated(model, theta, segments, path, g, moved)
     lost = _lost(segments, y, columns, wide)
@@ -251,7 +277,7 @@ def linear(
 
 
 def _lost(segments: Cut, y: np.ndarray, columns: np.ndarray, wide: Wide | None) -> np.ndarray:
-    """[S] bool: where path or columns are not finite, or the path is far from its measurement.
+    """[S] bool: where path or columns are not finite, or |y - y*| > RUN_AWAY √(σ₀² + σ²).
 
     Only measured bins count, and channels of one kind (both of position, both of velocity)
     have one width: that of `wide`, or the root mean square of what all segments span.
@@ -282,9 +308,10 @@ def chunks(count: int) -> Iterator[tuple[slice, Callable[[np.ndarray], np.ndarra
 
 
 def _along(model, theta, states, driven, step, *, coefficients) -> list[np.ndarray]:
-    """`_slopes` at every node, by segments: [S, K, 3, 6 or D or P; P only where `coefficients` are
-    asked for]. Those of a model that is smooth and takes long (a network) are worked out as often
-    as they change, and go straight between."""
+    """∂f/∂x, ∂f/∂u, ∂f/∂θ (`_slopes`) at every instant of a step, by segments [S, K, 3, 6 or D or
+    P; P only where `coefficients` are asked for]. Those of a model that is smooth and takes long (a
+    network) are worked out as often as they change, and go straight between:
+    A(tₖ) = A_left + (tₖ - t_left)/(t_right - t_left) (A_right - A_left)."""
     nodes = states.shape[1]
     stride = max(round(model.smooth / step), 1)
     at = np.unique(np.append(np.arange(0, nodes, stride), nodes - 1))
@@ -304,14 +331,15 @@ def _along(model, theta, states, driven, step, *, coefficients) -> list[np.ndarr
 
 
 def simulated(model, theta, segments, path, g, moved=None):
-    """y [S, B, 6] and its columns [S, B, 6, 6 + 3J (+ P)]: start, knots, θ. Not finite where the
-    model diverges."""
+    """y* [S, B, 6] and its columns (Z | H) [S, B, 6, 6 + 3J (+ C)]: by start, accelerations at the
+    nodes, and θ where `moved` is given. Not finite where the model diverges."""
     with np.errstate(all="ignore"):
         return _every(model, theta, segments, path, g, moved)
 
 
 def _every(model, theta, segments, path, g, moved):
-    many = finer(model, segments.step)
+    """`simulated`, chunk by chunk: y_b = (1/T) ∫ x dt over each bin of T s, by the trapezium."""
+    many = stable_steps(model, segments.step)
     step = segments.step / many
     acceleration, hats = path.at_nodes(g), _between(g.weights[None], many)[0]
     per = many * (g.nodes - 1) // g.bins

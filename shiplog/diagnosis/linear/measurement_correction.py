@@ -1,4 +1,12 @@
-"""What causes read otherwise than it was recorded, and how their numbers change it."""
+"""Causes that change what is read: O = ∂y/∂θ of the measurement and ∂u/∂θ of what drives the ship.
+
+Central differences of the record as it is read with a cause's number q more and less by a step
+h (READ_STEP of its realistic size), within the number's bounds:
+
+    ∂u/∂q ≈ (u(q + h) - u(q - h)) / 2h,   ∂y/∂q ≈ (y(q + h) - y(q - h)) / 2h
+
+Causes read one after the other, in the catalogue's order, each what the one before it has made.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +28,8 @@ READ_STEP = 0.3
 
 
 def corrected(causes: Sequence[Cause], record: Record, numbers: Mapping[str, np.ndarray]) -> Record:
-    """The record as those causes' numbers have it, in the catalogue's order."""
+    """r_Q(… r₂(r₁(record))): the record as those causes' numbers [SI] have it, in the catalogue's
+    order; a cause without numbers, or with zeros, changes nothing."""
     for cause in causes:
         values = numbers.get(cause.label)
         if values is not None and np.any(values != 0.0):
@@ -29,8 +38,8 @@ def corrected(causes: Sequence[Cause], record: Record, numbers: Mapping[str, np.
 
 
 def factors(causes: Sequence[Cause], numbers: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Family of the discrepancy → factor [3] (1) of X, Y and N that depend on its inputs: the
-    product over causes, label → numbers, SI, of what each `scales`."""
+    """Family of the discrepancy → factor Π_causes s [3] (1) of X, Y and N that depend on its
+    inputs: the product over causes, label → numbers, SI, of what each `scales`."""
     found: dict[str, np.ndarray] = {}
     for cause in causes:
         if (values := numbers.get(cause.label)) is None or not np.any(values != 0.0):
@@ -41,7 +50,7 @@ def factors(causes: Sequence[Cause], numbers: Mapping[str, np.ndarray]) -> dict[
 
 
 def water(causes: Sequence[Cause], numbers: Mapping[str, np.ndarray]) -> np.ndarray:
-    """[2] velocity of the water along x₀ and y₀ [m/s], label → numbers, SI: the sum over causes."""
+    """V = Σ_causes V(q) [2]: velocity of the water along x₀ and y₀ [m/s], label → numbers, SI."""
     found = np.zeros(2)
     for cause in causes:
         if (values := numbers.get(cause.label)) is None:
@@ -63,8 +72,9 @@ def read(
     rows: np.ndarray,
     numbers: Mapping[str, np.ndarray] | None = None,
 ) -> tuple[Cut, np.ndarray, np.ndarray]:
-    """Segments as read with `numbers`, and how each cause's numbers change them there: a clock's
-    by the motion averaged over seconds, as its noise tells nothing of a clock."""
+    """Segments as read with `numbers` (label → q, SI), ∂u/∂q [S, K, D, Q] and O = ∂y/∂q
+    [S, B, 6, Q] there, zero for causes that change no reading. Those of a clock are of the motion
+    averaged over AVERAGING_S, since the noise of a derivative says nothing of a clock."""
     given = dict(numbers or {})
     sizes = {c.label: c.sizes(setting) for c in model.causes}
     columns = Columns(0, model.causes, np.concatenate([*sizes.values(), np.zeros(0)]))
@@ -100,6 +110,6 @@ def read(
                 moved[..., -2:, column] = change / apart
             if more.state is not less.state:
                 between = replace(more, state=more.state - less.state)
-                observed[..., column] = segments.averaged(between, rows) / apart
+                observed[..., column] = segments.means_of_bins(between, rows) / apart
         before = corrected((cause,), before, given)
     return base, moved, observed

@@ -1,4 +1,8 @@
-"""What the numbers of a diagnosis stand for, one after another."""
+"""The vector of a diagnosis, θ [C] and w [W]: what its numbers stand for, one after another.
+
+All algebra is in units: number = unit · x, with x of about one, so that information matrices can
+be inverted. A column of J is multiplied by its unit; a Gaussian on x has information K.
+"""
 
 from __future__ import annotations
 
@@ -27,6 +31,7 @@ class Columns:
     misfit: int = 0
 
     def with_misfit(self, count: int) -> Columns:
+        """With `count` weights w behind θ, of unit one."""
         return replace(self, unit=np.concatenate((self.unit, np.ones(count))), misfit=count)
 
     @property
@@ -45,8 +50,9 @@ class Columns:
 
     @cached_property
     def known(self) -> np.ndarray:
-        """[C] prior information of each number, in units. A cause that is an alias of coefficients
-        or of another cause has no nominal size of its own."""
+        """K [C], the diagonal of the prior information on x: 1, a standard deviation of one unit;
+        HELD_INFORMATION of a cause that has no nominal size of its own, as it is an alias of
+        coefficients or of another cause."""
         whole = np.ones(len(self.unit))
         for cause in self.causes:
             if not cause.nominal:
@@ -54,7 +60,7 @@ class Columns:
         return whole
 
     def numbers(self, given: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Of all causes, with those of some, zero for the others."""
+        """q of all causes, SI, from those of some (label → q); zero for the others."""
         whole = np.zeros(self.linearised)
         for label, values in given.items():
             whole[self.of[label]] = values

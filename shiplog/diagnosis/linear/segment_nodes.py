@@ -1,4 +1,7 @@
-"""Motion, controls and accelerations at the nodes of segments, channel by channel."""
+"""Motion, controls and accelerations at the nodes of segments, channel by channel.
+
+The velocities are through the water, where it moves with V over ground: ν - Rᵀ(ψ) V.
+"""
 
 from __future__ import annotations
 
@@ -24,6 +27,9 @@ class Knots:
 
 
 def at_knots(segments: Cut, g: SegmentGrid) -> Knots:
+    """State and what drives at the nodes, the measured means of bins straight in between. Through
+    water that moves with V: (u, v) - Rᵀ(ψ) V, and the wind over the water W + V, where W is where
+    the wind comes from."""
     centre = (np.arange(g.bins) + 0.5) * g.seconds / g.bins
     every = round(g.knot / (g.step * g.every))
     state = resampled(centre, segments.y, np.arange(g.knots) * g.knot)
@@ -40,12 +46,12 @@ def at_knots(segments: Cut, g: SegmentGrid) -> Knots:
 
 
 def rows_at_knots(begins: np.ndarray, g: SegmentGrid) -> np.ndarray:
-    """[S, J] of the record, of segments that begin at these rows [S]."""
+    """Row of the record at each node [S, J], of segments that begin at these rows [S]."""
     return begins[:, None] + round(g.knot / g.step) * np.arange(g.knots)
 
 
 def in_each_channel(waves: np.ndarray) -> np.ndarray:
-    """[S, J, F] → [S, J, 3, 3F]."""
+    """I₃ ⊗ φᵀ at each node, [S, J, F] → [S, J, 3, 3F]: F features in each channel alone."""
     count = waves.shape[-1]
     out = np.zeros((*waves.shape[:2], 3, 3 * count))
     for channel in range(3):
@@ -54,7 +60,7 @@ def in_each_channel(waves: np.ndarray) -> np.ndarray:
 
 
 def accelerations(features: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
-    """[S, 3J, W]: acceleration of each weight at the knots, channel by channel; `acceleration` [3]
-    is the unit of size."""
+    """Φ [S, 3J, W]: acceleration of each weight at the nodes, channel by channel, m/s² and rad/s²,
+    of `features` [S, J, 3, W] times the unit of size `acceleration` [3]."""
     scaled = np.moveaxis(features * acceleration[:, None], 2, 1)
     return scaled.reshape(len(scaled), -1, scaled.shape[-1])

@@ -57,16 +57,16 @@ class Cut:
 
 @dataclass(frozen=True)
 class SegmentGrid:
-    """What is the same for every segment: nodes, bins, knots."""
+    """What is the same for every segment: K instants of steps, B bins, J nodes of acceleration."""
 
     step: float  # s between rows
     rows: int  # of a segment, less one
-    nodes: int
-    bins: int
-    knots: int
+    nodes: int  # K, instants of the integration's steps
+    bins: int  # B
+    knots: int  # J, nodes of the acceleration
     bin: float = BIN  # s
-    knot: float = KNOT  # s
-    every: int = NODE_ROWS  # rows to a node
+    knot: float = KNOT  # s between nodes of the acceleration
+    every: int = NODE_ROWS  # rows to a step
 
     @property
     def seconds(self) -> float:
@@ -74,7 +74,8 @@ class SegmentGrid:
 
     @property
     def weights(self) -> np.ndarray:
-        """[K, J] hat functions of the knots at the nodes."""
+        """hⱼ(tₖ) = max(0, 1 - |tₖ/Δ - j|) [K, J]: hat functions of the acceleration's nodes, Δ s
+        apart, at the instants of the steps."""
         at = np.arange(self.nodes) * self.step * self.every / self.knot
         return np.maximum(1.0 - np.abs(at[:, None] - np.arange(self.knots)), 0.0)
 
@@ -108,11 +109,12 @@ def measured(record: Record, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     g = grid(record)
     whole, ends, per = _in_bins(record.measured[:, None].astype(float), rows, g)
     measured = whole + ends[:, 1:] > 0.5 * (per + 1)
-    return averaged(record, rows), np.repeat(measured, 6, axis=-1)
+    return means_of_bins(record, rows), np.repeat(measured, 6, axis=-1)
 
 
-def averaged(record: Record, rows: np.ndarray) -> np.ndarray:
-    """State [S, B, 6], averaged over bins by the trapezium."""
+def means_of_bins(record: Record, rows: np.ndarray) -> np.ndarray:
+    """y_b = (½ x₀ + x₁ + … + x_{n-1} + ½ xₙ) / n: means of the state over bins [S, B, 6], by the
+    trapezium over the n rows that a bin goes on for."""
     whole, ends, per = _in_bins(record.state, rows, grid(record))
     return (whole + 0.5 * (ends[:, 1:] - ends[:, :-1])) / per
 
@@ -135,8 +137,8 @@ def driving(record: Record, rows: np.ndarray) -> np.ndarray:
 
 
 def at_nodes(record: Record, rows: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Of a record's rows [n, c] those at the steps' nodes [S, K, c], each the mean, by the
-    trapezium, of the rows about it: what lies between two nodes counts."""
+    """Of a record's rows [n, c] those at the steps' instants [S, K, c], each the mean, by the
+    trapezium, of the rows about it: what lies between two instants counts."""
     g = grid(record)
     at = rows[:, None] + g.every * np.arange(g.nodes)
     firsts, lasts, half = record.firsts[at], record.lasts[at], g.every // 2

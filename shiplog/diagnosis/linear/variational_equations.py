@@ -1,10 +1,13 @@
 """The variational equations of a rollout: the effect of start, nodes and numbers, step by step.
 
-    δ̇ = A(t) δ + B(t),  A, B the derivatives along the path
+    δ̇ = A(t) δ + B(t),   δ [6, 6 + 3J + P] = ∂x/∂(ξ, a, θ),   δ(0) = (I | 0 | 0)
 
-by the same two-step Adams-Bashforth as the path itself, so that the columns are derivatives of
-what was simulated and not of what it approximates. Plain loops, compiled: a column costs some
-sixty operations a step, and an array library spends most of its time moving them about.
+A [6, 6] = ∂ẋ/∂x along the path: rows of x₀, y₀ and ψ from the kinematics, rows of u, v and r
+∂f/∂x. B has rows of u, v and r only: hⱼ(t) by the acceleration of node j, ∂f/∂θ by a coefficient,
+and ∂f/∂θ + ∂f/∂u ∂u/∂θ by a cause's number. Integrated by the same two-step Adams-Bashforth as
+the path itself, so that the columns are derivatives of what was simulated and not of what it
+approximates. Plain loops, compiled: a column costs some sixty operations a step, and an array
+library spends most of its time moving them about.
 """
 
 from __future__ import annotations
@@ -20,12 +23,14 @@ _in_earth_axes = numba.njit(fastmath={"contract"})(frames.in_earth_axes)
 
 @numba.njit(cache=True, fastmath={"contract"})
 def columns(states, by_state, by_driven, by_theta, moved, hats, step, bins):
-    """[S, B, 6, 6 + 3J + P]: means over bins, by start, knots and θ.
+    """(Z | H) [S, B, 6, 6 + 3J + P]: means of δ over bins, by start, accelerations at the nodes
+    (channel by channel), and θ.
 
-    states    [S, K, 6]     the path at the nodes
-    by_state  [S, K, 3, 6]  ∂ν̇; by_driven [S, K, 3, D] and by_theta [S, K, 3, P] likewise
-    moved     [S, K, D, Q]  how what drives changes with each of the last Q of θ
-    hats      [K, J]        of the knots at the nodes
+    states    [S, K, 6]     x*, the path at the instants of the steps
+    by_state  [S, K, 3, 6]  ∂f/∂x; by_driven ∂f/∂u [S, K, 3, D] and by_theta ∂f/∂θ [S, K, 3, P]
+    moved     [S, K, D, Q]  ∂u/∂θ, how what drives changes with each of the last Q of θ
+    hats      [K, J]        hⱼ(tₖ)
+    step      h [s]
     """
     count, nodes = states.shape[:2]
     knots, p, q = hats.shape[1], by_theta.shape[3], moved.shape[3]
@@ -68,7 +73,8 @@ def columns(states, by_state, by_driven, by_theta, moved, hats, step, bins):
 
 @numba.njit(cache=True, fastmath={"contract"})
 def _slope(now, cos, sin, north, east, a, acceleration, change):
-    """δ̇ [6, W] into `change`."""
+    """δ̇ = A δ + B [6, W] into `change`: of the path's position, turned by ψ, and
+    δν̇ = ∂f/∂x δx + `acceleration` [3, W]; `north`, `east` ∂(ẋ₀, ẏ₀)/∂ψ, `a` ∂f/∂x [3, 6]."""
     x, du, y, dv, heading, dr = now[0], now[1], now[2], now[3], now[4], now[5]
     for i in range(now.shape[1]):
         change[0, i] = _in_earth_axes(du[i], dv[i], cos, sin)[0] + north * heading[i]
@@ -88,7 +94,8 @@ def _slope(now, cos, sin, north, east, a, acceleration, change):
 
 @numba.njit(cache=True, fastmath={"contract"})
 def _step(now, before, change, sums, new, old, half):
-    """One step on; the trapezium's share of a bin into `sums`."""
+    """δₖ₊₁ = δₖ + `new` δ̇ₖ + `old` δ̇ₖ₋₁; the trapezium's share of a bin, `half` (δₖ + δₖ₊₁), into
+    `sums`."""
     for c in range(6):
         at, was, slope, total = now[c], before[c], change[c], sums[c]
         for i in range(now.shape[1]):

@@ -1,4 +1,8 @@
-"""Numbers of causes between their bounds: a lag is not negative."""
+"""Numbers of causes between their bounds: a lag is not negative.
+
+A posterior x ~ N(m, Σ) without bounds, of a prior N(0, diag(s²)), is restricted to a region B. The
+most probable x in B is reported, and B multiplies the evidence by P(B | data) / P(B).
+"""
 
 from __future__ import annotations
 
@@ -14,8 +18,11 @@ NEARLY_KNOWN = 1e-12  # of a variance, below which rounding may have left it
 def within(
     mean: np.ndarray, covariance: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> np.ndarray:
-    """[Q] a Gaussian's most probable numbers between bounds; one at its bound moves others. Numbers
-    of a fit that diverged stay as they are."""
+    """argmin (x - m)ᵀ Σ⁻¹ (x - m) over low ≤ x ≤ high [Q]: a Gaussian's most probable numbers
+    between bounds; one at its bound moves others. Numbers of a fit that diverged stay as they are.
+
+    mean, covariance   m [Q], Σ [Q, Q]; all in one system of units
+    """
     if ((mean >= low) & (mean <= high)).all():
         return mean
     if not (np.isfinite(mean).all() and np.isfinite(covariance).all()):
@@ -32,39 +39,43 @@ def within(
 def log_share(
     mean: np.ndarray, deviation: np.ndarray, size: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> float:
-    """What bounds add to the log evidence of numbers [Q]: the posterior probability that they are
-    within, over the prior one. Each number by itself.
+    """Σᵢ log P(lowᵢ ≤ xᵢ ≤ highᵢ | data) - log P(lowᵢ ≤ xᵢ ≤ highᵢ), nats: what bounds add to the
+    log evidence of numbers [Q], each by itself.
 
-    mean, deviation  of the posterior without bounds
-    size             standard deviation of the prior, about zero
+    mean, deviation  mᵢ and Σᵢᵢ^½ of the posterior without bounds
+    size             sᵢ, standard deviation of the prior, about zero
     """
     after = _log_within((low - mean) / deviation, (high - mean) / deviation)
     return float((after - _log_within(low / size, high / size)).sum())
 
 
 def on_board(mean: np.ndarray, covariance: np.ndarray, farthest: float, at: int = 0) -> np.ndarray:
-    """[Q] a Gaussian's most probable numbers of which the one after `at` is at most `farthest`
-    times that one, either way; those that are, stay. One that moves, moves others."""
+    """argmin (x - m)ᵀ Σ⁻¹ (x - m) over |xᵢ₊₁| ≤ k |xᵢ| [Q]: the most probable numbers of which the
+    one after i = `at` is at most k = `farthest` times that one, either way; those that are, stay.
+
+    On an edge nᵀ x = 0, n = ±k eᵢ - eᵢ₊₁, the minimum is x = m - Σ n (nᵀ m) / (nᵀ Σ n), of cost
+    (nᵀ m)² / (nᵀ Σ n); the cheaper edge has it.
+    """
     if abs(mean[at + 1]) <= farthest * abs(mean[at]):
         return mean
-    found = []
+    edges = []
     for way in (-farthest, farthest):
-        normal = np.zeros(len(mean))
-        normal[at : at + 2] = way, -1.0  # second = way · first
-        pull = covariance @ normal
-        moved = mean - pull * (normal @ mean) / (normal @ pull)
-        found.append((float((normal @ mean) ** 2 / (normal @ pull)), tuple(moved)))
-    return np.array(min(found)[1])
+        n = np.zeros(len(mean))
+        n[at : at + 2] = way, -1.0  # second = way · first
+        Sigma_n = covariance @ n
+        x = mean - Sigma_n * (n @ mean) / (n @ Sigma_n)
+        edges.append((float((n @ mean) ** 2 / (n @ Sigma_n)), tuple(x)))
+    return np.array(min(edges)[1])
 
 
 def log_on_board(
     mean: np.ndarray, covariance: np.ndarray, size: np.ndarray, farthest: float
 ) -> float:
-    """What it adds to the log evidence of two numbers that the second is at most `farthest` times
-    the first one: the posterior probability of that, over the prior one.
+    """log P(|x₂| ≤ k |x₁| | data) - log P(|x₂| ≤ k |x₁|), nats: what this bound adds to the log
+    evidence of two numbers, k = `farthest`.
 
-    mean, covariance  of the posterior without this bound
-    size              [2] standard deviations of the prior, about zero
+    mean, covariance  m [2], Σ [2, 2] of the posterior without this bound
+    size              s [2], standard deviations of the prior, about zero
     """
     return _log_on_board(mean, covariance, farthest) - _log_on_board(
         np.zeros(2), np.diag(size**2), farthest
@@ -72,7 +83,8 @@ def log_on_board(
 
 
 def _log_on_board(mean: np.ndarray, covariance: np.ndarray, farthest: float) -> float:
-    """Log probability that two numbers are so, the first one integrated out."""
+    """log ∫ N(x₁; m₁, Σ₁₁) P(|x₂| ≤ k |x₁| | x₁) dx₁, by a sum over NODES points within REACH
+    standard deviations; x₂ | x₁ ~ N(m₂ + β (x₁ - m₁), Σ₂₂ - β Σ₁₂), β = Σ₁₂/Σ₁₁."""
     deviation = float(np.sqrt(covariance[0, 0]))
     first = mean[0] + deviation * np.linspace(-REACH, REACH, NODES)
     slope = covariance[0, 1] / covariance[0, 0]
@@ -86,7 +98,7 @@ def _log_on_board(mean: np.ndarray, covariance: np.ndarray, farthest: float) -> 
 
 
 def _log_within(low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Log probability of a standard Gaussian between two numbers."""
+    """log(Φ(high) - Φ(low)) of the standard Gaussian distribution Φ."""
     turned = low > 0.0  # the tail that loses no digits
     low, high = np.where(turned, -high, low), np.where(turned, -low, high)
     upper, lower = log_ndtr(high), log_ndtr(low)

@@ -1,4 +1,4 @@
-"""Parts of a campaign, and the products and squares of their segments."""
+"""Parts of a campaign, the products G = Σ_s w_s G_s of their segments, and their evidence."""
 
 from __future__ import annotations
 
@@ -41,7 +41,12 @@ def products(
     modes: Modes, parts: Sequence[np.ndarray], unit: np.ndarray,
     weight: np.ndarray | None = None, noise: float = 1.0,
 ) -> list[np.ndarray]:  # fmt: skip
-    """[1 + C, 1 + C] of each part, in units [C]."""
+    """G = diag(1, u) Σ_s w_s G_s(λ) diag(1, u) [1 + C, 1 + C] of each part, its segments s.
+
+    unit     u [C]
+    weight   w [S] of each segment; one unless given
+    noise    λ, factor of the process noise
+    """
     by = np.concatenate(([1.0], unit))
     scale = np.outer(by, by)
     weight = np.ones(len(modes.dd)) if weight is None else weight
@@ -49,34 +54,43 @@ def products(
 
 
 def robust_weights(square: np.ndarray, kept: np.ndarray) -> np.ndarray:
-    """Weight [S] of segments with these squares [S]: what is ROBUST medians off or more counts
-    less, so that a few segments do not decide. Segments that are not `kept` [S] have none."""
+    """w_s = min(1, ROBUST · median(χ²)/χ²_s) [S] of segments with these squares χ² [S]: a few
+    segments do not decide. Segments that are not `kept` [S] have none."""
     middle = float(np.median(square[kept])) if kept.any() else 1.0
     weight = np.minimum(1.0, ROBUST * middle / np.maximum(square, 1e-9))
     return np.where(kept, weight, 0.0)
 
 
 def squares(modes: Modes, numbers: np.ndarray, noise: float = 1.0) -> np.ndarray:
-    """χ² [S] of the segments with these numbers [C + W], SI: of the pass's own columns, then of
-    those of accelerations at the nodes."""
-    r = np.concatenate(([1.0], -numbers))
-    left, more = r[: modes.dd.shape[-1]], r[modes.dd.shape[-1] :]
-    accelerations = modes.accelerations @ more
-    along = modes.md @ left
-    square = np.einsum("i,sij,j->s", left, modes.dd, left, optimize=True)
-    square += ((2.0 * along + modes.felt * accelerations) * accelerations).sum(-1)
-    return square - ((along + modes.felt * accelerations) ** 2 / (modes.felt + noise**-2.0)).sum(-1)
+    """χ²_s = (e - J x)ᵀ C_s⁻¹ (e - J x) [S] of numbers x = (d, w) [C + W], SI: of the pass's own
+    columns, then of those of accelerations at the nodes. With v = (1, -d) and ψ = -Ψ w,
+
+        χ² = vᵀ Eᵀ E v + Σ ψ (2 M v + f ψ) - Σ (M v + f ψ)² / (f + λ⁻²)
+
+    noise   λ
+    """
+    x = np.concatenate(([1.0], -numbers))
+    v, minus_w = x[: modes.dd.shape[-1]], x[modes.dd.shape[-1] :]
+    psi = modes.accelerations @ minus_w
+    Mv = modes.md @ v
+    square = np.einsum("i,sij,j->s", v, modes.dd, v, optimize=True)
+    square += ((2.0 * Mv + modes.felt * psi) * psi).sum(-1)
+    return square - ((Mv + modes.felt * psi) ** 2 / (modes.felt + noise**-2.0)).sum(-1)
 
 
 def marginal(gram: np.ndarray, information: np.ndarray, pull: np.ndarray) -> float:
-    """Log likelihood [nats] of [e | J] with its numbers integrated out, up to a constant
-    (a Gaussian integral).
+    """Log evidence [nats] of e = J x + ε, x ~ N(Λ⁻¹ η, Λ⁻¹), ε ~ N(0, C), up to a constant:
 
-    gram          products [1 + C, 1 + C] of [e | J]
-    information   [C, C] on the numbers before any data; pull [C] what it pulls towards
+        log p(e) = -½ (g₀₀ + ηᵀ Λ⁻¹ η - (g + η)ᵀ (M + Λ)⁻¹ (g + η) + log|M + Λ| - log|Λ|)
+
+    gram          G [1 + C, 1 + C] = [e | J]ᵀ C⁻¹ [e | J], of blocks g₀₀, g = G₁₀ and M = G₁₁
+    information   Λ [C, C]
+    pull          η [C]
+
+    Raises np.linalg.LinAlgError where a matrix is singular. log|C| is the caller's.
     """
-    both = gram[1:, 1:] + information
-    towards = gram[1:, 0] + pull
+    M_Lambda = gram[1:, 1:] + information
+    g_eta = gram[1:, 0] + pull
     square = gram[0, 0] + pull @ np.linalg.solve(information, pull)
-    square -= towards @ np.linalg.solve(both, towards)
-    return -0.5 * float(square + np.linalg.slogdet(both)[1] - np.linalg.slogdet(information)[1])
+    square -= g_eta @ np.linalg.solve(M_Lambda, g_eta)
+    return -0.5 * float(square + np.linalg.slogdet(M_Lambda)[1] - np.linalg.slogdet(information)[1])

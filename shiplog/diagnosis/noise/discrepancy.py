@@ -4,7 +4,12 @@ Equations of another form leave an acceleration that depends on motion, controls
 of forces has one that depends on position, heading or time. Each family is a sum of fixed features
 with unknown weights (Kennedy & O'Hagan 2001). The weights of motion, controls and wind are
 estimated from the nominal campaign. An unknown structure of the trial is a change of one family's
-weights.
+weights. In channel c, at node j, with the conditions xⱼ there,
+
+    a_c(tⱼ) = q_c Σ_families (1/√F) Σ_f φ_f(xⱼ) w_cf,   w ~ N(0, s² I)
+
+φ of unit mean square over the campaigns, q_c the standard deviation of the process noise: a size s
+of a family is the acceleration that it is expected to make, in units of process noise.
 
 Features of motion, controls and wind are the products of ship hydrodynamics (Abkowitz 1964; moduli
 after Fedyaevsky & Sobolev 1964) and smooth random features (Rahimi & Recht 2007). A dependence on
@@ -48,6 +53,7 @@ class Waves:
     phase: np.ndarray
 
     def __call__(self, z: np.ndarray) -> np.ndarray:
+        """√(2/F) cos((z - m)/s · ω_f + φ_f) [..., F]."""
         scaled = (z - self.middle) / self.width
         return np.sqrt(2.0 / len(self.phase)) * np.cos(scaled @ self.frequency + self.phase)
 
@@ -68,7 +74,9 @@ class Family:
     columns: np.ndarray
 
     def features(self, knots: Knots) -> np.ndarray:
-        """[S, J, 3, 3F]: acceleration of each weight, in units of the process noise."""
+        """I₃ ⊗ φ/√F [S, J, 3, 3F], φ_f = (feature - level)/scale: acceleration of each weight, in
+        units of the process noise. Features of the position and of an even force are turned into
+        body axes; those of an even force come first, and are not divided by √F."""
         values = (features(self.name, self.profile, self.waves, knots) - self.level) / self.scale
         plain = EVEN.get(self.name, 0)
         out = segment_nodes.in_each_channel(values[..., plain:] / np.sqrt(values.shape[-1] - plain))
@@ -93,7 +101,8 @@ class Discrepancy:
         return sum(len(family.columns) for family in self.families)
 
     def accelerations(self, cut: Cut, g: SegmentGrid) -> np.ndarray:
-        """[S, 3J, W]: acceleration of each weight at the knots, channel by channel."""
+        """Φ [S, 3J, W]: acceleration of each weight at the nodes, channel by channel, m/s² and
+        rad/s²; times the factors of the causes that scale a family's forces."""
         if not self.families:
             return np.zeros((len(cut), 3 * g.knots, 0))
         knots = segment_nodes.at_knots(cut, g)
@@ -135,7 +144,9 @@ def of(
 
 
 def _waves(name: str, *campaigns: Knots) -> Waves | None:
-    """None where nothing of the family varies."""
+    """√(2/F) cos(z · ω_f + φ_f), z [n] standardised, ω_f ~ N(0, I/max(n/2, 1)), φ_f ~ U(0, 2π)
+    (Rahimi & Recht 2007), drawn once a family; of the heading its harmonics, cos kψ and sin kψ.
+    None where nothing of the family varies."""
     z = np.concatenate([v.reshape(-1, v.shape[-1]) for v in (_inputs(name, k) for k in campaigns)])
     width = z.std(0)
     if not (width > 1e-9).any():
@@ -152,7 +163,8 @@ def _waves(name: str, *campaigns: Knots) -> Waves | None:
 
 
 def features(name: str, profile: Profile, waves: Waves, knots: Knots) -> np.ndarray:
-    """[S, J, F]"""
+    """Features of a family at the nodes [S, J, F], before level and scale: products of ship
+    hydrodynamics, or of an even force, then the smooth ones."""
     inputs = _inputs(name, knots)
     smooth = waves(inputs)
     if name in UNSEEN:
@@ -164,7 +176,8 @@ def features(name: str, profile: Profile, waves: Waves, knots: Knots) -> np.ndar
 
 
 def _even(name: str, inputs: np.ndarray, waves: Waves) -> np.ndarray:
-    """[S, J, EVEN] of a force along the earth's axes: steady, and growing with each input."""
+    """(1, (x - m)/s) [S, J, EVEN] of a force along the earth's axes: steady, and growing with each
+    input x, of mean m and standard deviation s over the campaigns."""
     steady = np.ones_like(inputs[..., :1])
     if name == "heading":  # felt by the ship, a steady force already turns with it
         return steady
@@ -172,6 +185,8 @@ def _even(name: str, inputs: np.ndarray, waves: Waves) -> np.ndarray:
 
 
 def _inputs(name: str, knots: Knots) -> np.ndarray:
+    """What a family depends on [S, J, n], SI: (x₀, y₀), ψ, the share of the campaign, (u, v, r),
+    actuators and u, or the apparent flow of the air."""
     state, driven = knots.state, knots.driven
     if name == "position":
         return state[..., [0, 2]]
@@ -187,7 +202,8 @@ def _inputs(name: str, knots: Knots) -> np.ndarray:
 
 
 def apparent_flow(knots: Knots) -> np.ndarray:
-    """[..., 2] where the apparent wind comes from, ahead and to starboard [m/s]."""
+    """(u_A, v_A) = Rᵀ(ψ) W + (u, v) [..., 2]: where the apparent wind comes from, ahead and to
+    starboard, of the true wind W (where that comes from, over the water) [m/s]."""
     state = knots.state
     c, s = np.cos(state[..., 4]), np.sin(state[..., 4])
     ahead, starboard = frames.in_body_axes(knots.driven[..., -2], knots.driven[..., -1], c, s)
@@ -195,6 +211,8 @@ def apparent_flow(knots: Knots) -> np.ndarray:
 
 
 def _of_motion(profile: Profile, knots: Knots) -> list[np.ndarray]:
+    """u, v, r, u|u|, v|v|, r|r|, uv, ur, vr, |u|v, |u|r, |v|r, |r|v (Abkowitz 1964; moduli after
+    Fedyaevsky & Sobolev 1964)."""
     u, v, r = (knots.state[..., [i]] for i in (1, 3, 5))
     return [
         u, v, r, u * np.abs(u), v * np.abs(v), r * np.abs(r), u * v, u * r, v * r,
@@ -203,9 +221,12 @@ def _of_motion(profile: Profile, knots: Knots) -> list[np.ndarray]:
 
 
 def _of_controls(profile: Profile, knots: Knots) -> list[np.ndarray]:
-    """Of every unit that drives n|n| and |n|u; of every angle δ sin δ u|u|, 1 - cos δ, and both in
-    the stream of each unit of `driven_by`. A rudder's force need not go on with its angle (stall,
-    play, a stop): sin(πδ/δ_max), times u|u| and in the same streams."""
+    """n|n| and |n|u of every unit that drives, n in rev/s; of every angle δ
+
+        sin δ u|u|,  1 - cos δ,  n|n| sin δ,  n|n| (1 - cos δ)   of each unit of `driven_by`,
+        sin(πδ/δ_max) u|u|,  sin(πδ/δ_max) n|n|                  of a rudder,
+
+    whose force need not grow with its angle (stall, play, a stop)."""
     u = knots.state[..., [1]]
     driving = [i for i, a in enumerate(profile.actuators) if a.kind in ("propeller", "thruster")]
     found = []
@@ -241,6 +262,7 @@ def driven_by(profile: Profile, angle: int, driving: list[int]) -> list[int]:
 
 
 def _of_wind(profile: Profile, knots: Knots) -> list[np.ndarray]:
+    """U_A² cos kα and U_A² sin kα, k = 1, 2, 3: harmonics of the apparent wind's angle α."""
     wind = apparent_flow(knots)
     square, angle = (wind**2).sum(-1, keepdims=True), np.arctan2(wind[..., [1]], wind[..., [0]])
     return [square * wave(k * angle) for k in (1, 2, 3) for wave in (np.cos, np.sin)]
@@ -252,7 +274,8 @@ PRODUCTS: dict[str, Callable[[Profile, Knots], list[np.ndarray]]] = {
 
 
 def _turned(out: np.ndarray, knots: Knots) -> np.ndarray:
-    """What pulls towards a place pulls along the earth's axes: turned into the body's, in place."""
+    """(X, Y) = Rᵀ(ψ) (X₀, Y₀): what pulls towards a place pulls along the earth's axes; turned into
+    the body's, in place."""
     heading = knots.state[..., [4]]
     north, east = out[..., 0, :].copy(), out[..., 1, :].copy()
     out[..., 0, :], out[..., 1, :] = frames.in_body_axes(

@@ -27,9 +27,10 @@ FELT = 1.0  # least that voyages say of a weight, in units of what was known of 
 
 @dataclass(frozen=True)
 class Misfit:
-    """The network's smooth features, and the sums of them that these voyages say something of.
+    """a_c = Σ_f φ_f(x) (A_c w)_f: the network's smooth features φ [F], and the sums of them that
+    these voyages say something of, w ~ N(0, I) [W].
 
-    axes   [3, F, W]  weights of the features of each channel, in m/s² and rad/s²
+    axes   A [3, F, W], weights of the features of each channel, in m/s² and rad/s²
     """
 
     network: Network
@@ -40,24 +41,28 @@ class Misfit:
         return self.axes.shape[-1]
 
     def accelerations(self, cut: Cut, g: SegmentGrid) -> np.ndarray:
-        """[S, 3J, W]: acceleration of each weight at the knots, channel by channel."""
+        """Φ = φᵀ A_c [S, 3J, W]: acceleration of each weight at the nodes, channel by channel."""
         waves = _features(self.network, segment_nodes.at_knots(cut, g))
         return np.concatenate([waves @ axes for axes in self.axes], axis=1)
 
     def bends(self, weights: np.ndarray) -> np.ndarray:
-        """[F, 3] weights [W] as `Network.bend` takes them."""
+        """(A_c w)_c [F, 3] of weights w [W], as `Network.bend` takes them."""
         return (self.axes @ weights).T
 
 
-def of(
+def estimate(
     network: Network, cut: Cut, g: SegmentGrid, modes: Modes, known: np.ndarray,
     unit: np.ndarray, acceleration: np.ndarray,
 ) -> Misfit:  # fmt: skip
-    """With the most probable size, conditional on numbers [C] in `unit`s [C] with the prior
-    information `known`.
+    """The misfit with the most probable size s, the numbers d [C] integrated out (`_likelihood`).
+
+    A_c = s q_c B U_c. B [F, SUMS] are the axes of Σ φ φᵀ over the voyages with the largest
+    eigenvalues; U [3 SUMS, W], of rows U_c, the eigenvectors of s² M_ww, the information of these
+    voyages on the weights, with eigenvalues above FELT.
 
     cut    of the voyages that `modes` are of
-    acceleration  [3] unit of size
+    known  K [C], prior information of d, in `unit`s [C]
+    acceleration  q [3], unit of size
     """
     waves = _features(network, segment_nodes.at_knots(cut, g))
     sums = np.linalg.eigh(np.tensordot(waves, waves, ((0, 1), (0, 1))))[1][:, -SUMS:]
@@ -76,17 +81,20 @@ def of(
 
 
 def _features(network: Network, knots: Knots) -> np.ndarray:
-    """[S, J, F]"""
+    """φ [S, J, F] of the network at the nodes."""
     actuator, wind = knots.driven[..., :-3], knots.driven[..., -2:]
     return np.asarray(network.features(*map(jnp.asarray, (knots.state, actuator, wind))))
 
 
 def _likelihood(total: np.ndarray, known: np.ndarray, size: float) -> float:
-    """Log marginal likelihood of a campaign's products together with weights of one size, up to
-    what no size changes."""
+    """½ (gᵀ (M + Λ)⁻¹ g - log|M + Λ|), Λ = diag(K, I): log evidence of a campaign's products G
+    together with weights of one size s (rows and columns of w times s), up to what no size changes.
+
+    total   G [1 + C + W, 1 + C + W], of blocks g₀₀, g and M; known   K [C]; size   s
+    """
     count = len(total) - 1 - len(known)
     by = np.concatenate((np.ones(1 + len(known)), np.full(count, size)))
-    scaled = total * np.outer(by, by)
-    both = scaled[1:, 1:] + np.diag(np.concatenate((known, np.ones(count))))
-    found = scaled[1:, 0] @ np.linalg.solve(both, scaled[1:, 0])
-    return 0.5 * float(found - np.linalg.slogdet(both)[1])
+    G = total * np.outer(by, by)
+    M_Lambda = G[1:, 1:] + np.diag(np.concatenate((known, np.ones(count))))
+    explained = G[1:, 0] @ np.linalg.solve(M_Lambda, G[1:, 0])
+    return 0.5 * float(explained - np.linalg.slogdet(M_Lambda)[1])

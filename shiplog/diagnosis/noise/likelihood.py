@@ -1,12 +1,16 @@
 """Likelihood of every hypothesis from one pass of sensitivities over the segments.
 
-    e_s = Z_s z_s + J_s d + ε,  ε ~ N(0, R),  z = (start, acceleration at the nodes)
+    e_s = J_s d + Z_s z_s + ε_s,  ε_s ~ N(0, R),  z_s = (δξ, a) ~ N(0, P),  P = diag(P₀, λ² Q)
 
 The start is free. The acceleration is process noise: an Ornstein-Uhlenbeck process whose standard
 deviation is estimated from the nominal campaign (Kennedy & O'Hagan 2001). Both are eliminated
-segment by segment, which leaves one small matrix over [e | J]. Instrument noise is correlated from
-one observation to the next. Treated as white, it would imitate causes and make intervals too
-narrow.
+segment by segment, which leaves one small matrix over [e | J]:
+
+    G_s = [e | J]ᵀ C_s⁻¹ [e | J],   C_s = R + Z_s P Z_sᵀ
+
+Instrument noise is correlated from one observation to the next. Treated as white, it would imitate
+causes and make intervals too narrow. Symbols as in the room's opening; E stands for [e | J], Z₀ and
+Zₐ for the columns of Z by the start and by the acceleration at the nodes.
 """
 
 from __future__ import annotations
@@ -50,46 +54,57 @@ class ProcessNoise:
     knot: float = KNOT
 
     def kernel(self, knots: int) -> np.ndarray:
-        """Covariance [3J, 3J] of the acceleration at the knots, channel by channel; with a force
-        that is on or off [S, 3J, 3J]."""
-        apart = self.knot * np.arange(knots)
-        whole = np.kron(np.diag(self.acceleration**2), decay(apart, self.time))
+        """Q = diag(q²) ⊗ T(τ) + p pᵀ ⊗ (on ∘ T(τ_p)),  Tᵢⱼ(τ) = exp(-|tᵢ - tⱼ|/τ).
+
+        Covariance [3J, 3J] of the acceleration at J = `knots` nodes, channel by channel; with a
+        force that is on or off [S, 3J, 3J].
+
+        q   `acceleration` [3]   p   `intermittent` [3]   on   `runs` [S, J, J]
+        """
+        t = self.knot * np.arange(knots)
+        Q = np.kron(np.diag(self.acceleration**2), decay(t, self.time))
         if self.intermittent is None:
-            return whole
-        force = np.outer(self.intermittent, self.intermittent)
-        lasts = decay(apart, self.intermittent_time)
+            return Q
+        ppT = np.outer(self.intermittent, self.intermittent)
+        T = decay(t, self.intermittent_time)
         if self.runs is None:
-            return whole + np.kron(force, lasts)
-        each = np.einsum("ab,sij->saibj", force, self.runs * lasts)
-        return whole + each.reshape(len(each), *whole.shape)
+            return Q + np.kron(ppT, T)
+        each = np.einsum("ab,sij->saibj", ppT, self.runs * T)
+        return Q + each.reshape(len(each), *Q.shape)
 
     def times(self, factor: float) -> ProcessNoise:
+        """λ² Q: the same with standard deviations λ q."""
         return replace(self, acceleration=self.acceleration * factor)
 
     def precision(self, knots: int) -> np.ndarray:
-        """Of z [Z, Z]; with a force that is on or off [S, Z, Z]."""
-        size, known = 6 + 3 * knots, np.linalg.inv(self.kernel(knots))
-        whole = np.zeros((*known.shape[:-2], size, size))
-        whole[..., :6, :6] = np.diag(self.start**-2.0)
-        whole[..., 6:, 6:] = known
-        return whole
+        """P⁻¹ = diag(P₀⁻¹, Q⁻¹) of z [6 + 3J, 6 + 3J]; with a force that is on or off one of each
+        segment. Raises np.linalg.LinAlgError where Q is singular."""
+        size, Q_inverse = 6 + 3 * knots, np.linalg.inv(self.kernel(knots))
+        P_inverse = np.zeros((*Q_inverse.shape[:-2], size, size))
+        P_inverse[..., :6, :6] = np.diag(self.start**-2.0)
+        P_inverse[..., 6:, 6:] = Q_inverse
+        return P_inverse
 
 
 def decay(at: np.ndarray, time: float) -> np.ndarray:
-    """Correlation [J, J] of an Ornstein-Uhlenbeck process at these times [J], s, that fades within
-    `time`, s."""
+    """Tᵢⱼ = exp(-|tᵢ - tⱼ|/τ) + 10⁻⁹ δᵢⱼ [J, J]: correlation of an Ornstein-Uhlenbeck process at
+    the times `at` [J] with the correlation time τ, both in s. The last term keeps T invertible."""
     return np.exp(-np.abs(at[:, None] - at) / time) + 1e-9 * np.eye(len(at))
 
 
 def correlation_of_noise(share: float, fade: float, at: np.ndarray) -> np.ndarray:
-    """[B, B] of noise at these times [B], s, of which a share lasts, as an Ornstein-Uhlenbeck
-    process does, and fades within `fade`, s."""
+    """Γᵢₖ = (1 - ρ) δᵢₖ + ρ exp(-|tᵢ - tₖ|/τ) [B, B]: correlation of instrument noise at the times
+    `at` [B], s, of which a `share` ρ lasts and fades within `fade` τ, s."""
     apart = np.abs(np.subtract.outer(at, at))
     return (1.0 - share) * np.eye(len(at)) + share * np.exp(-apart / fade)
 
 
 class Whitening:
-    """Observations in units in which their noise is white and of unit size."""
+    """R^-½: observations in units in which their noise is white and of unit size.
+
+    In each channel c of a segment R = σ_c² Γ over the bins that were measured, Γ = L Lᵀ, and
+    R^-½ = L⁻¹/σ_c; rows of bins without a measurement are zero. `logdet` is log|R| of all.
+    """
 
     def __init__(self, used: np.ndarray, process_noise: ProcessNoise) -> None:
         """used   [S, B, 6] bool: rows without a measurement do not count"""
@@ -112,7 +127,7 @@ class Whitening:
             self.by.append(each / process_noise.noise[channel])
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
-        """[S, B, 6, n] → [S, 6 B, n]"""
+        """R^-½ X of X [S, B, 6, n], as [S, 6 B, n], channel by channel."""
         return np.concatenate([by @ values[:, :, c] for c, by in enumerate(self.by)], axis=1)
 
 
@@ -120,10 +135,11 @@ class Whitening:
 class Weighed:
     """Products of one pass under one instrument noise R, before the process noise is included.
 
-    dd      [S, 1 + C, 1 + C]  of [e | J]
-    zd      [S, Z, 1 + C]
-    zz      [S, Z, Z]
-    logdet  of R, over the observations used
+    dd      [S, 1 + C, 1 + C]        Eᵀ R⁻¹ E,  E = [e | J]
+    zd      [S, 6 + 3J, 1 + C]       Zᵀ R⁻¹ E
+    zz      [S, 6 + 3J, 6 + 3J]      Zᵀ R⁻¹ Z
+    logdet  log|R|, over the observations used
+    knots   J, number of nodes
     """
 
     dd: np.ndarray
@@ -134,24 +150,26 @@ class Weighed:
 
 
 def weighed(linear: Linear, process_noise: ProcessNoise) -> Weighed:
+    """Eᵀ R⁻¹ E, Zᵀ R⁻¹ E, Zᵀ R⁻¹ Z of every segment, and log|R| (first elimination)."""
     white = Whitening(linear.cut.used, process_noise)
-    d = white(np.concatenate((linear.e[..., None], linear.j), -1))
-    z = white(linear.z)
-    zt = np.swapaxes(z, 1, 2)
-    knots = (z.shape[-1] - 6) // 3
-    return Weighed(np.swapaxes(d, 1, 2) @ d, zt @ d, zt @ z, white.logdet, knots)
+    E = white(np.concatenate((linear.e[..., None], linear.j), -1))
+    Z = white(linear.z)
+    Zt = np.swapaxes(Z, 1, 2)
+    nodes = (Z.shape[-1] - 6) // 3
+    return Weighed(np.swapaxes(E, 1, 2) @ E, Zt @ E, Zt @ Z, white.logdet, nodes)
 
 
 @dataclass(frozen=True)
 class Gram:
-    """[e | J]ᵀ C⁻¹ [e | J] of every segment [S, 1 + C, 1 + C], and log |C| of all, restricted to
-    what no start explains."""
+    """G_s = [e | J]ᵀ C_s⁻¹ [e | J] of every segment [S, 1 + C, 1 + C], and Σ log|C_s|, restricted
+    to what no start explains."""
 
     each: np.ndarray
     logdet: float
 
     def scaled(self, unit: np.ndarray) -> Gram:
-        """Of numbers in these units [C]: matrices of numbers that differ by 1e6 do not invert."""
+        """diag(1, u) G_s diag(1, u) of numbers in units u [C]: matrices of numbers that differ by
+        1e6 do not invert."""
         by = np.concatenate(([1.0], unit))
         return Gram(self.each * np.outer(by, by), self.logdet)
 
@@ -161,12 +179,12 @@ class Modes:
     """A pass without its starts, in axes that diagonalise prior and data information of the
     acceleration at the nodes. Any factor λ of the process noise is then a division.
 
-    dd      [S, 1 + C, 1 + C]  of [e | J], the start eliminated
-    md      [S, 3J, 1 + C]     of the modes with [e | J]
-    felt    [S, 3J]            data information of each mode over its prior information
-    axes    [S, 3J, 3J]        from accelerations at the nodes to modes
-    logdet  of noise and start
-    accelerations  [S, 3J, W]  modes of further columns that act as accelerations at the nodes
+    dd      [S, 1 + C, 1 + C]  Eᵀ E, white and the start eliminated; E = [e | J]
+    md      [S, 3J, 1 + C]     M = Uᵀ Lᵀ Zₐᵀ E
+    felt    [S, 3J]            f, data information of each mode over its prior information
+    axes    [S, 3J, 3J]        Uᵀ L⁻¹, from accelerations at the nodes to modes
+    logdet  log|R| + log|F + P₀⁻¹| - log|F|, of noise and start
+    accelerations  [S, 3J, W]  Ψ = Uᵀ L⁻¹ Φ, modes of further columns that act as accelerations
     """
 
     dd: np.ndarray
@@ -177,7 +195,7 @@ class Modes:
     accelerations: np.ndarray
 
     def joined(self, accelerations: np.ndarray) -> Modes:
-        """With W columns more, of accelerations [S, 3J, W] at the knots."""
+        """With W columns more, Ψ = Uᵀ L⁻¹ Φ of accelerations Φ [S, 3J, W] at the nodes."""
         return replace(
             self, accelerations=np.concatenate((self.accelerations, self.axes @ accelerations), -1)
         )
@@ -188,45 +206,54 @@ class Modes:
         return replace(self, accelerations=self.accelerations[..., :more])
 
     def total(self, weight: np.ndarray, noise_factor: float = 1.0) -> np.ndarray:
-        """[1 + C + W, 1 + C + W] sum of `gram`'s matrices, weighted [S], without making each of
-        them."""
-        part = np.sqrt(weight[:, None] / (self.felt + noise_factor**-2.0))[..., None]
-        flat = (self.md * part).reshape(-1, self.md.shape[-1])
-        total = np.tensordot(weight, self.dd, 1) - flat.T @ flat
+        """G = Σ_s w_s G_s(λ) [1 + C + W, 1 + C + W], without making each of `gram`'s matrices.
+
+            G_EE = Σ_s w_s (Eᵀ E - Mᵀ D M),   D = diag(1 / (f + λ⁻²))
+            G_ΨE = Σ_s w_s λ⁻² Ψᵀ D M,   G_ΨΨ = Σ_s w_s λ⁻² Ψᵀ D diag(f) Ψ
+
+        weight         w [S] of each segment
+        noise_factor   λ
+        """
+        root = np.sqrt(weight[:, None] / (self.felt + noise_factor**-2.0))[..., None]  # (w D)^½
+        M = (self.md * root).reshape(-1, self.md.shape[-1])
+        G = np.tensordot(weight, self.dd, 1) - M.T @ M
         if not self.accelerations.shape[-1]:
-            return total
+            return G
         # the effect of such a column, less the part that process noise explains
-        more = (self.accelerations * part).reshape(-1, self.accelerations.shape[-1])
-        across = noise_factor**-2.0 * (more.T @ flat)
-        more *= np.sqrt(self.felt).reshape(-1, 1) / noise_factor
-        return np.block([[total, across.T], [across, more.T @ more]])
+        Psi = (self.accelerations * root).reshape(-1, self.accelerations.shape[-1])
+        across = noise_factor**-2.0 * (Psi.T @ M)
+        Psi *= np.sqrt(self.felt).reshape(-1, 1) / noise_factor
+        return np.block([[G, across.T], [across, Psi.T @ Psi]])
 
     def gram(self, noise_factor: float = 1.0) -> Gram:
-        bent = self.felt[..., None] * self.accelerations
+        """G_s(λ) = E'ᵀ E' - M'ᵀ diag(1 / (f + λ⁻²)) M' of every segment, with the further columns:
+        E'ᵀ E' = [[Eᵀ E, Mᵀ Ψ], [Ψᵀ M, Ψᵀ diag(f) Ψ]],  M' = [M | diag(f) Ψ]; and log|C|."""
+        f_Psi = self.felt[..., None] * self.accelerations
         across = np.swapaxes(self.md, 1, 2) @ self.accelerations
-        dd = np.block([
+        EtE = np.block([
             [self.dd, across],
-            [np.swapaxes(across, 1, 2), np.swapaxes(self.accelerations, 1, 2) @ bent],
+            [np.swapaxes(across, 1, 2), np.swapaxes(self.accelerations, 1, 2) @ f_Psi],
         ])  # fmt: skip
-        md = np.concatenate((self.md, bent), -1)
-        part = md / (self.felt + noise_factor**-2.0)[..., None]
-        return Gram(dd - np.swapaxes(md, 1, 2) @ part, self.log_volume(noise_factor))
+        M = np.concatenate((self.md, f_Psi), -1)
+        D_M = M / (self.felt + noise_factor**-2.0)[..., None]
+        return Gram(EtE - np.swapaxes(M, 1, 2) @ D_M, self.log_volume(noise_factor))
 
     def log_volume(self, noise_factor: float = 1.0, weight: np.ndarray | None = None) -> float:
-        """log |C| of all segments, by itself; of the noise that a factor changes, each segment with
-        its weight [S]."""
+        """Σ_s log|C_s| = `logdet` + Σ_s w_s Σ log(1 + λ² f_s): log|C| of all segments; the part
+        that the factor λ changes has each segment's weight w [S], one unless given."""
         each = np.log1p(noise_factor**2 * self.felt).sum(-1)
         return self.logdet + float(each.sum() if weight is None else weight @ each)
 
 
 @dataclass(frozen=True)
 class Startless:
-    """A pass without its starts, whatever is known of the acceleration at the knots.
+    """A pass without its starts, whatever is known of the acceleration at the nodes: products in
+    C₀⁻¹, C₀ = R + Z₀ P₀ Z₀ᵀ.
 
-    dd      [S, 1 + C, 1 + C]  of [e | J]
-    kd      [S, 3J, 1 + C]
-    kk      [S, 3J, 3J]
-    logdet  of noise and start
+    dd      [S, 1 + C, 1 + C]  Eᵀ C₀⁻¹ E,  E = [e | J]
+    kd      [S, 3J, 1 + C]     Zₐᵀ C₀⁻¹ E
+    kk      [S, 3J, 3J]        Zₐᵀ C₀⁻¹ Zₐ
+    logdet  log|R| + log|F + P₀⁻¹| - log|F|, of noise and start
     """
 
     dd: np.ndarray
@@ -235,78 +262,89 @@ class Startless:
     logdet: float
 
     def square(self, process_noise: ProcessNoise) -> tuple[np.ndarray, float]:
-        """Of a pass of e alone eᵀ C⁻¹ e of every segment [S], and log |C| of all: a Cholesky root
-        ends with the one, and the rest of its diagonal is the other."""
-        knots = self.kk.shape[-1]
-        kernel = process_noise.kernel(knots // 3)
-        bordered = np.empty((len(self.kk), knots + 1, knots + 1))
-        bordered[:, :knots, :knots] = self.kk + np.linalg.inv(kernel)
-        bordered[:, :knots, knots:], bordered[:, knots:, knots:] = self.kd, self.dd
-        bordered[:, knots, :knots] = self.kd[..., 0]
+        """eᵀ C⁻¹ e of every segment [S], of a pass of e alone, and Σ log|C|.
+
+        With A = Zₐᵀ C₀⁻¹ Zₐ + Q⁻¹ and b = Zₐᵀ C₀⁻¹ e, the last diagonal element of the Cholesky
+        root of [[A, b], [bᵀ, eᵀ C₀⁻¹ e]] is (eᵀ C₀⁻¹ e - bᵀ A⁻¹ b)^½ = (eᵀ C⁻¹ e)^½; the others
+        give log|A|, and log|C| = log|C₀| + log|Q| + log|A|. Raises np.linalg.LinAlgError where the
+        matrix is not positive definite.
+        """
+        n = self.kk.shape[-1]  # 3J
+        Q = process_noise.kernel(n // 3)
+        bordered = np.empty((len(self.kk), n + 1, n + 1))
+        bordered[:, :n, :n] = self.kk + np.linalg.inv(Q)
+        bordered[:, :n, n:], bordered[:, n:, n:] = self.kd, self.dd
+        bordered[:, n, :n] = self.kd[..., 0]
         root = np.diagonal(np.linalg.cholesky(bordered), axis1=1, axis2=2)
-        each = np.broadcast_to(np.linalg.slogdet(kernel)[1], len(self.kk))
-        of_kernel = float(each.sum())
-        volume = of_kernel + 2.0 * float(np.log(root[:, :knots]).sum())
-        return root[:, knots] ** 2, self.logdet + volume
+        each = np.broadcast_to(np.linalg.slogdet(Q)[1], len(self.kk))
+        log_Q = float(each.sum())
+        volume = log_Q + 2.0 * float(np.log(root[:, :n]).sum())
+        return root[:, n] ** 2, self.logdet + volume
 
 
 def startless(weighed: Weighed, process_noise: ProcessNoise) -> Startless:
-    """Start eliminated. Raises np.linalg.LinAlgError where the path diverged."""
+    """Second elimination, of the start: X ← Xᵀ R⁻¹ X - Xᵀ R⁻¹ Z₀ (F + P₀⁻¹)⁻¹ Z₀ᵀ R⁻¹ X of
+    X = (E | Zₐ), F = Z₀ᵀ R⁻¹ Z₀. Raises np.linalg.LinAlgError where the path diverged."""
     if not (np.isfinite(weighed.zz).all() and np.isfinite(weighed.dd).all()):
         raise np.linalg.LinAlgError("the path diverged: it has no products")
-    known = np.diag(process_noise.start**-2.0)
-    start = weighed.zz[:, :6, :6] + known
+    P0_inverse = np.diag(process_noise.start**-2.0)
+    A = weighed.zz[:, :6, :6] + P0_inverse  # F + P₀⁻¹
     # in units of each number of the start, or its columns are too unlike to invert
-    unit = np.diagonal(start, axis1=1, axis2=2) ** -0.5
-    start = start * unit[:, :, None] * unit[:, None, :]
-    columns = np.concatenate((weighed.zz[:, :6, 6:], weighed.zd[:, :6]), -1) * unit[..., None]
-    solved = np.linalg.solve(start, columns)
-    count = weighed.zz.shape[-1] - 6
-    by_knots, by_numbers = np.swapaxes(columns[..., :count], 1, 2), columns[..., count:]
+    unit = np.diagonal(A, axis1=1, axis2=2) ** -0.5
+    A = A * unit[:, :, None] * unit[:, None, :]
+    Z0_X = np.concatenate((weighed.zz[:, :6, 6:], weighed.zd[:, :6]), -1) * unit[..., None]
+    A_Z0_X = np.linalg.solve(A, Z0_X)
+    n = weighed.zz.shape[-1] - 6  # 3J
+    Za_Z0, Z0_E = np.swapaxes(Z0_X[..., :n], 1, 2), Z0_X[..., n:]
     return Startless(
-        weighed.dd - np.swapaxes(by_numbers, 1, 2) @ solved[..., count:],
-        weighed.zd[:, 6:] - by_knots @ solved[..., count:],
-        weighed.zz[:, 6:, 6:] - by_knots @ solved[..., :count],
-        weighed.logdet + _of_start(weighed, known),
+        weighed.dd - np.swapaxes(Z0_E, 1, 2) @ A_Z0_X[..., n:],
+        weighed.zd[:, 6:] - Za_Z0 @ A_Z0_X[..., n:],
+        weighed.zz[:, 6:, 6:] - Za_Z0 @ A_Z0_X[..., :n],
+        weighed.logdet + _log_volume_of_start(weighed, P0_inverse),
     )
 
 
 def modes(weighed: Weighed, process_noise: ProcessNoise) -> Modes:
-    """Start eliminated, acceleration along its principal axes (Woodbury). Raises
+    """Third elimination prepared: Q = L Lᵀ, Lᵀ (Zₐᵀ C₀⁻¹ Zₐ) L = U diag(f) Uᵀ (Woodbury), so that
+    C⁻¹ = C₀⁻¹ - C₀⁻¹ Zₐ L U diag(1 / (f + λ⁻²)) Uᵀ Lᵀ Zₐᵀ C₀⁻¹ for every factor λ. Raises
     np.linalg.LinAlgError where the path diverged."""
-    left = startless(weighed, process_noise)
-    root = np.linalg.cholesky(process_noise.kernel(weighed.knots))
-    turned = np.swapaxes(root, -1, -2)
-    felt, axes = np.linalg.eigh(turned @ left.kk @ root)
-    across = np.swapaxes(axes, 1, 2)
+    without_start = startless(weighed, process_noise)
+    L = np.linalg.cholesky(process_noise.kernel(weighed.knots))
+    Lt = np.swapaxes(L, -1, -2)
+    f, U = np.linalg.eigh(Lt @ without_start.kk @ L)
+    Ut = np.swapaxes(U, 1, 2)
     return Modes(
-        left.dd, across @ (turned @ left.kd), np.maximum(felt, 0.0),
-        across @ np.linalg.inv(root), left.logdet, np.zeros((*felt.shape, 0)),
+        without_start.dd, Ut @ (Lt @ without_start.kd), np.maximum(f, 0.0),
+        Ut @ np.linalg.inv(L), without_start.logdet, np.zeros((*f.shape, 0)),
     )  # fmt: skip
 
 
-def _of_start(weighed: Weighed, known: np.ndarray) -> float:
+def _log_volume_of_start(weighed: Weighed, P0_inverse: np.ndarray) -> float:
+    """Σ_s log|F + P₀⁻¹| - log|F|, F = Z₀ᵀ R⁻¹ Z₀ [S, 6, 6]; 10⁻⁹ P₀⁻¹ keeps F invertible."""
     # Restricted likelihood (Patterson & Thompson 1971): how far a model lets a start be felt is
     # no evidence, and a ship with less damping would be punished for it, segment by segment.
-    felt = weighed.zz[:, :6, :6]
-    of = np.linalg.slogdet(felt + known)[1] - np.linalg.slogdet(felt + 1e-9 * known)[1]
-    return float(of.sum())
+    F = weighed.zz[:, :6, :6]
+    each = np.linalg.slogdet(F + P0_inverse)[1] - np.linalg.slogdet(F + 1e-9 * P0_inverse)[1]
+    return float(each.sum())
 
 
 def whitened_posterior(
     z: np.ndarray, left: np.ndarray, process_noise: ProcessNoise
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Mean [S, Z, 1] and covariance [S, Z, Z] of start and knots, of columns and error in white."""
-    zt = np.swapaxes(z, 1, 2)
-    covariance = np.linalg.inv(zt @ z + process_noise.precision((z.shape[-1] - 6) // 3))
-    return covariance @ (zt @ left), covariance
+    """z | r ~ N(V Zᵀ r, V),  V = (Zᵀ Z + P⁻¹)⁻¹: mean [S, 6 + 3J, 1] and covariance of start and
+    accelerations, of the columns Z [S, 6B, 6 + 3J] and the error r = `left` [S, 6B, 1], both white.
+    Raises np.linalg.LinAlgError where the matrix is singular."""
+    Zt = np.swapaxes(z, 1, 2)
+    V = np.linalg.inv(Zt @ z + process_noise.precision((z.shape[-1] - 6) // 3))
+    return V @ (Zt @ left), V
 
 
 def starts_and_knots(
     linear: Linear, d: np.ndarray, process_noise: ProcessNoise
 ) -> tuple[np.ndarray, np.ndarray]:
-    """z [S, Z] of every segment and its covariance [S, Z, Z], the numbers d [C] given."""
+    """z | e, d ~ N(V Zᵀ R⁻¹ (e - J d), V),  V = (Zᵀ R⁻¹ Z + P⁻¹)⁻¹: mean [S, 6 + 3J] and covariance
+    of every segment, the numbers d [C], SI, given."""
     white = Whitening(linear.cut.used, process_noise)
-    left = white((linear.e - linear.j @ d)[..., None])
-    z, covariance = whitened_posterior(white(linear.z), left, process_noise)
-    return z[..., 0], covariance
+    r = white((linear.e - linear.j @ d)[..., None])
+    z, V = whitened_posterior(white(linear.z), r, process_noise)
+    return z[..., 0], V

@@ -1,7 +1,13 @@
 """When a force that is either on or off was on.
 
-A hidden Markov model of two states (Rabiner 1989): the force at a knot is Gaussian about zero,
+A hidden Markov model of two states sₖ (Rabiner 1989): the force at a node is Gaussian about zero,
 large or small. The most probable course of the states and the sizes are estimated in turn.
+
+    |Fₖ| given sₖ:  N(0, v_s + σₖ²),  v_on = mean of F² where it is on, v_off where it is off
+    p(s) = p(s₁) Π p(sₖ | sₖ₋₁);  max over s of  Σₖ log N(Fₖ) + log p(s)       Viterbi (1967)
+
+Before any data, each probability of a change is uniform, and with the numbers n of each kind of
+transition   p(s) = ½ B(1 + n_off→on, 1 + n_off→off) B(1 + n_on→off, 1 + n_on→on).
 """
 
 from __future__ import annotations
@@ -35,8 +41,8 @@ class Course:
 def course(force: np.ndarray, deviation: np.ndarray, rows: np.ndarray) -> Course | None:
     """The most probable course; None where the force is always on, or always off.
 
-    force, deviation  [S, J] estimate at the knots and its standard deviation, N
-    rows              [S, J] of the record at the knots, in order
+    force, deviation  F, σ [S, J], estimate at the nodes and its standard deviation, N
+    rows              [S, J] of the record at the nodes, in order
     """
     size, variance = np.abs(force.ravel()), deviation.ravel() ** 2
     on = size > ON * np.quantile(size, STRONGEST)
@@ -55,8 +61,8 @@ def course(force: np.ndarray, deviation: np.ndarray, rows: np.ndarray) -> Course
 
 
 def runs(on: Intervals, rows: np.ndarray) -> np.ndarray:
-    """[S, J, J] 1 where the force is on at both knots of a segment, in one run, and 0 elsewhere;
-    `rows` [S, J] of the record at the knots."""
+    """onᵢⱼ [S, J, J]: 1 where the force is on at both nodes i and j of a segment, in one run, and 0
+    elsewhere; `rows` [S, J] of the record at the nodes."""
     first, last = np.array(on).T
     of = np.searchsorted(first, rows, side="right") - 1
     of = np.where((of >= 0) & (rows <= last[of]), of, -1)
@@ -64,6 +70,7 @@ def runs(on: Intervals, rows: np.ndarray) -> np.ndarray:
 
 
 def _log_density(size: np.ndarray, variance: np.ndarray) -> np.ndarray:
+    """log N(F; 0, v) = -½ (F²/v + log v), up to a constant."""
     return -0.5 * (size**2 / variance + np.log(variance))
 
 
@@ -74,20 +81,23 @@ def _counts(on: np.ndarray) -> np.ndarray:
 
 
 def _log_transitions(on: np.ndarray) -> np.ndarray:
-    """[2, 2] from each state to each: their mean after a uniform prior (Laplace)."""
+    """log((n + 1)/Σ(n + 1)) [2, 2] from each state to each: their mean after a uniform prior
+    (Laplace)."""
     counts = _counts(on) + 1.0
     return np.log(counts / counts.sum(1, keepdims=True))
 
 
 def _log_prior(on: np.ndarray) -> float:
-    """Of the states after the first, each probability of a change uniform from 0 to 1."""
+    """log p(s) = log B(1 + n_off→on, 1 + n_off→off) + log B(1 + n_on→off, 1 + n_on→on) - log 2:
+    each probability of a change uniform from 0 to 1."""
     (stays_off, goes_on), (goes_off, stays_on) = _counts(on)
     whole = betaln(1.0 + goes_on, 1.0 + stays_off) + betaln(1.0 + goes_off, 1.0 + stays_on)
     return float(whole) - math.log(2.0)  # either may be the first
 
 
 def _most_probable(each: np.ndarray, transitions: np.ndarray) -> np.ndarray:
-    """[n] bool (Viterbi 1967), of the log densities [n, 2] of each state."""
+    """argmax_s Σₖ log N(Fₖ | sₖ) + log p(sₖ | sₖ₋₁) [n] bool (Viterbi 1967), of the log densities
+    [n, 2] of each state."""
     reached = each[0]
     came_from = np.zeros(each.shape, dtype=int)
     for at in range(1, len(each)):
@@ -102,7 +112,7 @@ def _most_probable(each: np.ndarray, transitions: np.ndarray) -> np.ndarray:
 
 
 def _intervals(on: np.ndarray, rows: np.ndarray) -> Intervals:
-    """Rows of each run's first and last knot; runs of two segments that share a knot are one."""
+    """Rows of each run's first and last node; runs of two segments that share a node are one."""
     found: list[tuple[int, int]] = []
     for states, at in zip(on, rows, strict=True):
         edges = np.flatnonzero(np.diff(np.concatenate(([False], states, [False])).astype(int)))

@@ -3,6 +3,11 @@
 Waves and gusts do not raise the noise of surge, sway and yaw rate alike. Were all three raised by
 one factor, whatever acts on one of them more than on the others would look like a force. So would
 noise that lasts longer than that of the nominal voyages: swell and squalls do.
+
+    q → (c_u q_u, c_v q_v, c_r q_r),  τ → c_τ τ:   max over c of  log p(r | c),  r = e - J d
+    log p(r | c) = -½ κ (Σ_s w_s r_sᵀ C_s(c)⁻¹ r_s + Σ_s log|C_s(c)|)
+
+κ is the share of itself that a trial counts (`Reference.counts`).
 """
 
 from __future__ import annotations
@@ -36,7 +41,7 @@ class Left:
     counts: float
 
     def likelihood(self, process_noise: ProcessNoise) -> float:
-        """Log likelihood, nats, up to a constant."""
+        """-½ κ (Σ_s w_s r_sᵀ C_s⁻¹ r_s + Σ_s log|C_s|): log likelihood, nats, up to a constant."""
         each, volume = self.startless.square(process_noise)
         return -0.5 * self.counts * (float(self.weight @ each) + volume)
 
@@ -44,7 +49,7 @@ class Left:
 def left_by(
     linear: Linear, d: np.ndarray, nominal: ProcessNoise, weight: np.ndarray, counts: float
 ) -> Left:
-    """What numbers d [C], SI, leave of a pass; weight [S] of its segments. Raises
+    """r = e - J d: what numbers d [C], SI, leave of a pass; weight w [S] of its segments. Raises
     np.linalg.LinAlgError where its path diverged."""
     kept = weight > 0.0  # a segment that says nothing has no likelihood
     linear, weight = linear.pick(kept), weight[kept]
@@ -55,8 +60,8 @@ def left_by(
 
 
 def by_channel(left: Left, at_one_place: Remainder | None = None) -> tuple[float, Remainder]:
-    """Log likelihood of the most probable factors of surge, sway and yaw rate and of the
-    correlation time, and these factors.
+    """max over (log c_u, log c_v, log c_r, log c_τ) of log p(r | c), nats, and the factors c of
+    surge, sway, yaw rate and correlation time (Nelder & Mead 1965, from the best common factor).
 
     at_one_place  nominal process noise that acts at one place: it is raised, and lasts longer, with
                   the others; None without any

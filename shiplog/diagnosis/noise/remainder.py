@@ -65,21 +65,22 @@ class Remainder:
         return self.noisy or self.kind in (RAISED, INTERMITTENT)
 
     def overall(self, noise_factor: float) -> float:
-        """A common factor times the geometric mean of those of the channels."""
+        """λ (c_u c_v c_r)^⅓: a common factor times the geometric mean of those of the channels."""
         return noise_factor * float(np.prod(self.channels)) ** (1.0 / len(self.channels))
 
     def factor_with_force(self, noise_factor: float, acceleration: np.ndarray) -> float:
-        """Factor of the nominal process noise, of root mean square `acceleration` [3], that this
-        noise and the force at one place are together: geometric mean of the channels."""
+        """Π_c (√((λ c_c q_c)² + p_c²)/q_c)^⅓: factor of the nominal process noise, of root mean
+        square q = `acceleration` [3], that this noise and the force at one place p are together:
+        geometric mean of the channels."""
         channels = noise_factor * np.array(self.channels) * acceleration
         force = np.zeros(3) if self.intermittent is None else np.array(self.intermittent)
         return float(np.prod(np.hypot(channels, force) / acceleration) ** (1.0 / len(channels)))
 
     def in_noise(self, process_noise: ProcessNoise, rows: np.ndarray | None = None) -> ProcessNoise:
-        """The process noise with the factors of its channels and of its time, and the intermittent
-        force in it.
+        """(c_u q_u, c_v q_v, c_r q_r), c_τ τ, p, c_p τ_p: the process noise with the factors of its
+        channels and of its time, and the intermittent force in it.
 
-        rows   [S, J] of the record at the knots of segments; without them a force that is on or off
+        rows   [S, J] of the record at the nodes of segments; without them a force that is on or off
                has its size only
         """
         if not self.shaped:
@@ -97,11 +98,19 @@ class Remainder:
 
 
 def noise_prior(noise: float, nominal: float, remainder: Remainder) -> float:
-    """Log prior density of a level of process noise together with a remainder, less the greatest
-    one together with NOMINAL.
+    """Log prior density of a level λ of process noise together with a remainder, less the greatest
+    one together with NOMINAL. The logarithms of the factors are Gaussian, with c_c those of the
+    channels and c_τ that of a correlation time (S RAISED_SPREAD, S_τ TIME_SPREAD):
 
-    noise   factor of the nominal process noise
-    nominal standard deviation of its logarithm from campaign to campaign
+        nominal                       -½ (log λ/σ)²
+        raised, one factor for all    -½ (log λ/S)² - log(S/σ)
+        raised in each channel        -½ Σ_c (log(λ c_c)/S)² - 3 log(S/σ)
+        and longer                    -½ (Σ_c (log(λ c_c)/S)² + (log c_τ/S_τ)²) - 4 log(S/σ)
+
+    A course of a force that is on or off adds its own log p(s).
+
+    noise     λ, factor of the nominal process noise
+    nominal   σ, standard deviation of its logarithm from campaign to campaign
     """
     if not remainder.raises:
         return -0.5 * (math.log(noise) / nominal) ** 2

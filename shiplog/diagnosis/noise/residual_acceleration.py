@@ -1,7 +1,9 @@
 """The residual acceleration along the measured path, with the conditions at each node.
 
-z | e ~ N(V Zᵀ R⁻¹ (e - J d), V),  V = (Zᵀ R⁻¹ Z + P)⁻¹: the posterior of a linear Gaussian model
-(Rasmussen & Williams 2006, Sec. 2.1), segment by segment, P the precision of `ProcessNoise`.
+    z | e ~ N(V Zᵀ R⁻¹ (e - J d), V),  V = (Zᵀ R⁻¹ Z + P⁻¹)⁻¹,  z = (δξ, a)
+
+The posterior of a linear Gaussian model (Rasmussen & Williams 2006, Sec. 2.1), segment by segment,
+P the covariance of start and process noise.
 """
 
 from __future__ import annotations
@@ -16,19 +18,19 @@ from shiplog.diagnosis.linear.linear_segments import Linear
 from shiplog.diagnosis.noise.likelihood import ProcessNoise, starts_and_knots
 from shiplog.voyages.rows.recording import Record
 
-HALF_SEGMENT = 8  # knots: half a segment
+HALF_SEGMENT = 8  # nodes: half a segment
 ACCELERATIONS = ("surge_acceleration", "sway_acceleration", "yaw_acceleration")
 
 
 @dataclass(frozen=True)
 class Unexplained:
-    """At J knots of S segments.
+    """a | e at J nodes of S segments.
 
-    mean, sd  [S, 3, J]  surge, sway [m/s²] and yaw [rad/s²]
+    mean, sd  [S, 3, J]  surge, sway [m/s²] and yaw [rad/s²]: V Zᵀ R⁻¹ (e - J d), diag(V)^½
     rows      [S, J]     of the record
     time      [S, J]     s into the voyage
     voyage    [S]        counts in the record's names
-    knot                 s between knots
+    knot                 s between nodes
     """
 
     mean: np.ndarray
@@ -58,19 +60,19 @@ def covering(record: Record) -> np.ndarray:
 def posterior(
     linear: Linear, d: np.ndarray, process_noise: ProcessNoise, record: Record
 ) -> Unexplained:
-    """Residual acceleration at the nodes, for numbers d [C] of the columns.
+    """a | e, d at the nodes: residual acceleration, for numbers d [C] of the columns, SI.
 
     record   the one that `linear.cut` was cut from
     """
     count, size = len(linear.e), linear.z.shape[-1]
-    knots = (size - 6) // 3
+    nodes = (size - 6) // 3
     z, covariance = starts_and_knots(linear, d, process_noise)
     mean = z[:, 6:]
     sd = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)[:, 6:])
     rows = segment_nodes.rows_at_knots(linear.cut.rows, segments.grid(record))
     return Unexplained(
-        mean.reshape(count, 3, knots),
-        sd.reshape(count, 3, knots),
+        mean.reshape(count, 3, nodes),
+        sd.reshape(count, 3, nodes),
         rows,
         record.time[rows],
         linear.cut.voyage,
@@ -78,10 +80,10 @@ def posterior(
     )
 
 
-def once(found: Unexplained) -> np.ndarray:
-    """[S, J] bool: each instant once, by the better known of knots less than half a step apart.
+def unique_instants(found: Unexplained) -> np.ndarray:
+    """[S, J] bool: each instant once, by the better known of nodes less than half a step apart.
 
-    Two segments share the knot where they meet, and the last of a stretch overlaps.
+    Two segments share the node where they meet, and the last of a stretch overlaps.
     """
     voyage = np.broadcast_to(found.voyage[:, None], found.rows.shape).ravel()
     rows, time = found.rows.ravel(), found.time.ravel()
@@ -104,9 +106,9 @@ def table(found: Unexplained, record: Record) -> pl.DataFrame:
 
     voyage, time_s, ACCELERATIONS, the same with _sd, x0, y0, heading in (-π, π], surge, sway,
     yaw_rate, the actuators, wind_ahead, wind_starboard (apparent, where it comes from), share (of
-    the campaign). Motion, actuators and wind are means over a knot's length about it (`around`).
+    the campaign). Motion, actuators and wind are means over a node's step about it (`means_about`).
     """
-    keep = once(found)
+    keep = unique_instants(found)
     rows = found.rows[keep]
     order = np.argsort(rows)
     rows = rows[order]
@@ -117,20 +119,23 @@ def table(found: Unexplained, record: Record) -> pl.DataFrame:
     for kind, values in (("", found.mean), ("_sd", found.sd)):
         for channel, name in enumerate(ACCELERATIONS):
             columns[name + kind] = values[:, channel][keep][order]
-    x0, surge, y0, sway, heading, yaw_rate = around(record, record.state, rows).T
+    x0, surge, y0, sway, heading, yaw_rate = means_about(record, record.state, rows).T
     columns |= {
         "x0": x0, "y0": y0, "heading": np.arctan2(np.sin(heading), np.cos(heading)),
         "surge": surge, "sway": sway, "yaw_rate": yaw_rate,
     }  # fmt: skip
-    actuator, wind = around(record, record.actuator, rows), around(record, record.wind, rows)
+    actuator, wind = (
+        means_about(record, record.actuator, rows),
+        means_about(record, record.wind, rows),
+    )
     columns |= dict(zip(record.profile.actuator_names, actuator.T, strict=True))
     columns |= {"wind_ahead": wind[:, 0], "wind_starboard": wind[:, 1], "share": record.share[rows]}
     return pl.DataFrame(columns)
 
 
-def around(record: Record, values: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Means [m, c] of values [n, c] over the time between two knots, about rows [m]; over less of
-    it at the ends of a stretch."""
+def means_about(record: Record, values: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """x̄ᵢ = Σ_{|k - i| ≤ h} xₖ / (2h + 1): means [m, c] of values [n, c] over the time between two
+    nodes, about rows i [m]; over less of it at the ends of a stretch."""
     half = round(0.5 * record.timescale.knot / record.step)
     low = np.maximum(rows - half, record.firsts[rows])
     high = np.minimum(rows + half, record.lasts[rows]) + 1

@@ -1,4 +1,14 @@
-"""What the nominal campaign alone says of model and ship; it can be kept for later trials."""
+"""What the nominal campaign alone says of model and ship; it can be kept for later trials.
+
+In turn, LEARNING_ROUNDS times, about θ* (symbols as in the room's opening):
+
+    D, s     variance of the parts' numbers, sizes of the discrepancy    `voyage_effects.learn`
+    w_s      min(1, ROBUST · median(χ²)/χ²_s), χ² with each part's own numbers   `robust_weights`
+    σ, q     of the residuals when each part has its own numbers         `noise_estimate`
+    x*(t)    paths about the acceleration of the discrepancy, Φ ŵ        `linearisation.pulled`
+
+then a and κ, and the spread of log λ over the parts.
+"""
 
 from __future__ import annotations
 
@@ -41,13 +51,13 @@ NOISE_TIMES = (0.25, 0.5, 1.0, 2.0, 4.0)  # of the process noise, times the firs
 class Characteristics:
     """What the nominal campaign alone says of model and ship; it can be kept for later trials.
 
-    process_noise  sizes and correlation times of instrument and process noise
-    deviation   group of columns → standard deviation of one part's numbers, in their units
-    size        family of the discrepancy → prior size of its weights
-    apart       how far voyages are from each other, in those deviations
-    share       share of itself that a trial counts
+    process_noise  sizes and correlation times of instrument and process noise: σ, q, τ
+    deviation   group of columns → D^½, standard deviation of one part's numbers, in their units
+    size        family of the discrepancy → s, prior size of its weights
+    apart       a, how far voyages are from each other, in those deviations
+    share       κ, share of itself that a trial counts
     noise       standard deviation, over the parts, of the logarithm of the process noise
-    weight      [S] of each segment
+    weight      w [S] of each segment
     path        of each segment, as a trial's segments have theirs: about the discrepancy
     """
 
@@ -67,7 +77,7 @@ class NominalPass:
 
     linear: Linear
     columns: Columns
-    held: np.ndarray
+    anchor: np.ndarray
     families: Discrepancy
     accelerations: np.ndarray
     rows: list[np.ndarray]
@@ -87,15 +97,17 @@ def nominal_pass(
     if not pulled:
         path = linearisation.pulled(model, whole, cut, g, wide, path)
     linear = linearisation.linear(model, whole, cut, g, path, moved, observed, wide)
-    held = nominal_fit.anchored(start, at.theta, columns)
+    anchor = nominal_fit.anchored(start, at.theta, columns)
     families = discrepancy.of(
         record.profile, at.process_noise.acceleration, len(columns.unit), discrepancy.SEEN,
         segment_nodes.at_knots(linear.cut, g),
     )  # fmt: skip
     accelerations = families.accelerations(linear.cut, g)
     columns = columns.with_misfit(families.count)
-    held = np.concatenate((held, np.zeros(families.count)))
-    return NominalPass(linear, columns, held, families, accelerations, parts_of(linear.cut.voyage))
+    anchor = np.concatenate((anchor, np.zeros(families.count)))
+    return NominalPass(
+        linear, columns, anchor, families, accelerations, parts_of(linear.cut.voyage)
+    )
 
 
 def characteristics(
@@ -104,8 +116,8 @@ def characteristics(
 ) -> Characteristics:  # fmt: skip
     """Estimated from the nominal voyages, linearised at their converged coefficients `at`."""
     made = nominal_pass(model, setting, start, record, at, numbers, pulled=not numbers)
-    columns, held, known = made.columns, made.held, made.columns.known
-    process_noise = noise_time(made.linear, made.accelerations, columns, held, at.process_noise)
+    columns, anchor, K = made.columns, made.anchor, made.columns.known
+    process_noise = noise_time(made.linear, made.accelerations, columns, anchor, at.process_noise)
     groups = groups_of(model, columns, made.families)
     sized = [family.columns for family in made.families.families]
     weight = np.ones(len(made.linear.e))
@@ -114,7 +126,7 @@ def characteristics(
             likelihood.weighed(made.linear, process_noise), process_noise
         ).joined(made.accelerations)
         each = products(modes, made.rows, columns.unit, weight)
-        effects = voyage_effects.learn(each, known, held, list(groups.values()), sized)
+        effects = voyage_effects.learn(each, K, anchor, list(groups.values()), sized)
         if round_ == LEARNING_ROUNDS - 1:
             break
         # what parts disagree in is no noise, nor what a few segments are off by
@@ -126,8 +138,8 @@ def characteristics(
         made = nominal_pass(model, setting, start, record, at, numbers)
     parts = [reduced(one, effects.deviation)[0] for one in each]
     voyages = made.linear.cut.voyage[[rows[0] for rows in made.rows]]
-    apart, share = campaign_prior.learn(parts, voyages, effects, held)
-    information, pull = prior(parts, effects.size**-2.0, held, apart * effects.deviation, share)
+    apart, share = campaign_prior.learn(parts, voyages, effects, anchor)
+    information, pull = prior(parts, effects.size**-2.0, anchor, apart * effects.deviation, share)
     return Characteristics(
         process_noise,
         {name: float(effects.deviation[at[0]]) for name, at in groups.items()},
@@ -155,6 +167,7 @@ def _path_about(
 
 
 def _weights(modes: Modes, made: NominalPass, effects: VoyageEffects) -> np.ndarray:
+    """w [S]: robust weights of χ²_s with each part's own numbers x + b_i."""
     assert effects.numbers is not None
     square = np.empty(len(modes.dd))
     for rows, numbers in zip(made.rows, effects.numbers, strict=True):
@@ -165,34 +178,40 @@ def _weights(modes: Modes, made: NominalPass, effects: VoyageEffects) -> np.ndar
 def _noise_of_parts(
     made: NominalPass, effects: VoyageEffects, process_noise: ProcessNoise, kept: np.ndarray
 ) -> ProcessNoise:
-    """Noise of the residuals of the `kept` [S] segments when every part has its own numbers."""
+    """σ, q of e - J (x + b_i) u of the `kept` [S] segments, every part i with its own numbers."""
     assert effects.numbers is not None
     own = np.empty((len(made.linear.e), len(made.columns.unit)))
     for rows, numbers in zip(made.rows, effects.numbers, strict=True):
         own[rows] = numbers * made.columns.unit
     left = made.linear.less_numbers(own, made.accelerations).pick(kept)
-    return noise_estimate.learnt(left, np.zeros(made.columns.linearised), process_noise, rounds=3)
+    return noise_estimate.estimate(left, np.zeros(made.columns.linearised), process_noise, rounds=3)
 
 
 def noise_time(
     linear: Linear,
     accelerations: np.ndarray,
     columns: Columns,
-    held: np.ndarray,
+    anchor: np.ndarray,
     process_noise: ProcessNoise,
 ) -> ProcessNoise:
-    """Sizes and correlation time of the process noise that make the nominal campaign likeliest,
-    the model's discrepancy aside."""
+    """argmax_τ max_{σ, q} log p(e; σ, q, τ): sizes and correlation time of instrument and process
+    noise that make the nominal campaign likeliest, all numbers x integrated out; τ of NOISE_TIMES
+    times the first guess, from the middle to either side while the likelihood grows.
+
+    accelerations   Φ [S, 3J, W]; anchor   η [C]
+    """
     best, found = -math.inf, process_noise
     middle = NOISE_TIMES.index(1.0)
     for way in (NOISE_TIMES[middle:], NOISE_TIMES[:middle][::-1]):
         for factor in way:
             tried = replace(found, time=factor * process_noise.time)
             for _ in range(2 if factor == 1.0 else 1):
-                numbers, _ = _solved(linear, accelerations, tried, columns, held)
+                numbers, _ = _solved(linear, accelerations, tried, columns, anchor)
                 left = linear.less(accelerations @ numbers[columns.linearised :])
-                tried = noise_estimate.learnt(left, numbers[: columns.linearised], tried, rounds=2)
-            _, value = _solved(linear, accelerations, tried, columns, held)
+                tried = noise_estimate.estimate(
+                    left, numbers[: columns.linearised], tried, rounds=2
+                )
+            _, value = _solved(linear, accelerations, tried, columns, anchor)
             if value < best:
                 break
             best, found = value, tried
@@ -204,17 +223,18 @@ def _solved(
     accelerations: np.ndarray,
     process_noise: ProcessNoise,
     columns: Columns,
-    held: np.ndarray,
+    anchor: np.ndarray,
 ) -> tuple[np.ndarray, float]:
-    """Likeliest numbers [C], SI, and the campaign's log marginal likelihood."""
+    """u (M + K)⁻¹ (g + η) [C]: likeliest numbers, SI; and log p(e), the campaign's log evidence
+    [nats] (`marginal`, and the volume -½ Σ log|C_s|)."""
     modes = likelihood.modes(likelihood.weighed(linear, process_noise), process_noise).joined(
         accelerations
     )
     by = np.concatenate(([1.0], columns.unit))
-    total = modes.total(np.ones(len(linear.e))) * np.outer(by, by)
-    both = total[1:, 1:] + np.diag(columns.known)
-    value = marginal(total, np.diag(columns.known), held) - 0.5 * modes.log_volume()
-    return np.linalg.solve(both, total[1:, 0] + held) * columns.unit, value
+    G = modes.total(np.ones(len(linear.e))) * np.outer(by, by)
+    M_K = G[1:, 1:] + np.diag(columns.known)
+    value = marginal(G, np.diag(columns.known), anchor) - 0.5 * modes.log_volume()
+    return np.linalg.solve(M_K, G[1:, 0] + anchor) * columns.unit, value
 
 
 def groups_of(model: Extended, columns: Columns, families: Discrepancy) -> dict[str, np.ndarray]:
@@ -228,8 +248,11 @@ def groups_of(model: Extended, columns: Columns, families: Discrepancy) -> dict[
 
 
 def _noise(modes, rows, columns, effects, information, pull, weight) -> float:
-    """Root mean square, over the parts, of the logarithm of the process noise over its estimate for
-    the whole campaign."""
+    """√mean_i (log λ_i)²: root mean square, over the parts i, of the logarithm of the process noise
+    over its estimate for the whole campaign,
+
+        λ_i = argmax log p(e_i; λ),  x ~ N(Λ⁻¹ η, Λ⁻¹) + b_i integrated out, λ of NOISE_LEVELS
+    """
     found = []
     for part in rows:
         own = picked(modes, part)

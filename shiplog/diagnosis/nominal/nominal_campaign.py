@@ -67,24 +67,25 @@ class Campaign:
 
     @cached_property
     def parts(self) -> tuple[np.ndarray, ...]:
-        """`each` with every part's own numbers integrated out."""
+        """`each` with every part's own numbers b ~ N(0, D) integrated out (`reduced`)."""
         return tuple(reduced(g, self.deviation)[0] for g in self.each)
 
     @cached_property
     def voyages(self) -> tuple[np.ndarray, ...]:
-        """Products of each voyage, its own numbers integrated out."""
+        """Σ_i G_vi of each voyage, its own numbers c ~ N(0, a² D) integrated out."""
         return tuple(
             campaign_prior.of_voyages(self.parts, self.voyage, self.apart * self.deviation)[0]
         )
 
     @property
     def deviation(self) -> np.ndarray:
-        """Of one part's numbers, the unseen families' with them [C + W]."""
+        """D^½ [C + W] of one part's numbers; zero of the unseen families' weights."""
         return np.append(self.effects.deviation, np.zeros(self.unseen.count))
 
     def residual(self, record: Record) -> Linear | None:
-        """The nominal voyages, whose record this is, without what the campaign says and what each
-        of its parts deviates by; None where there are none of the model's own."""
+        """e - J (x̂ + b̂_i) u: the nominal voyages, whose record this is, without what the campaign
+        says and what each of its parts i deviates by, b ~ N(0, (1 + a²) D); None where there are
+        none of the model's own."""
         made = self.reference
         if made.nominal is None or made.misfit is None or not self.rows:
             return None
@@ -98,12 +99,12 @@ class Campaign:
         return made.nominal.less_numbers(numbers, weights)
 
     def prior_without(self, left_out: int, apart: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Information and pull of θ, one nominal voyage left out; of the numbers of a voyage that
-        is so far `apart`."""
-        known = self.effects.size**-2.0
-        count = 1 + len(known)
+        """Λ [C, C] and η [C] (`campaign_prior.prior`), one nominal voyage left out; of the numbers
+        of a voyage that is so far `apart`, a."""
+        K = self.effects.size**-2.0
+        count = 1 + len(K)
         kept = [g[:count, :count] for i, g in enumerate(self.voyages) if i != left_out]
-        return prior(kept, known, self.reference.anchor, apart * self.effects.deviation,
+        return prior(kept, K, self.reference.anchor, apart * self.effects.deviation,
                      self.reference.counts)  # fmt: skip
 
 
@@ -111,11 +112,17 @@ def learn(
     model: Extended, setting: Setting, start: Start, record: Record, at: Converged,
     found: Characteristics, numbers: Mapping[str, np.ndarray] | None = None,
 ) -> Campaign:  # fmt: skip
-    """The campaign as a trial's causes see it, which depend on where the trial was. `numbers` as in
-    `assumed`."""
+    """The campaign as a trial's causes see it, which depend on where the trial was: linearised
+    about θ*, with the products of its parts and the prior of a trial's numbers,
+
+        Λ = (V + δ²)⁻¹,  V = (K + κ Σ_v M_v)⁻¹,  m = V (η + κ Σ_v g_v)      `campaign_prior.prior`
+
+    δ = a D^½ where there is one voyage only, whose parts then count as voyages. `numbers` as in
+    `assumed`. Raises np.linalg.LinAlgError where a matrix is singular.
+    """
     made = nominal_pass(model, setting, start, record, replace(at, path=found.path), numbers)
-    columns, held, families = made.columns, made.held, made.families
-    process_noise, known = found.process_noise, made.columns.known
+    columns, anchor, families = made.columns, made.anchor, made.families
+    process_noise, K = found.process_noise, made.columns.known
     modes = likelihood.modes(likelihood.weighed(made.linear, process_noise), process_noise).joined(
         made.accelerations
     )
@@ -127,23 +134,23 @@ def learn(
     unit = np.append(columns.unit, np.ones(unseen.count))
     weight = np.where(made.linear.lost, 0.0, found.weight)
     every = products(whole, made.rows, unit, weight)
-    deviation, size = np.zeros(len(known)), known**-0.5
+    deviation, size = np.zeros(len(K)), K**-0.5
     for name, where in groups_of(model, columns, families).items():
         deviation[where] = found.deviation.get(name, voyage_effects.UNSEEN_DEVIATION)
     for family in families.families:
         size[family.columns] = found.size[family.name]
     effects = VoyageEffects(deviation, size)
-    count = 1 + len(known)
+    count = 1 + len(K)
     parts = [reduced(g[:count, :count], deviation)[0] for g in every]
     voyage = made.linear.cut.voyage[[rows[0] for rows in made.rows]]
-    own = np.zeros(len(known))
+    own = np.zeros(len(K))
     if len(np.unique(voyage)) == 1:  # its parts share its deviation, which another voyage has not
         voyage, own = np.arange(len(parts)), found.apart * deviation
     voyages, _ = campaign_prior.of_voyages(parts, voyage, found.apart * deviation)
-    information, pull = prior(voyages, size**-2.0, held, own, found.share)
+    information, pull = prior(voyages, size**-2.0, anchor, own, found.share)
     reference_made = Reference(
         model, setting, at.theta, columns, process_noise, nominal_fit.wide_of(setting),
-        information, pull, held, made.linear,
+        information, pull, anchor, made.linear,
         nominal_reference.freedom(len(voyages)),
         misfit=families,  # type: ignore[arg-type]  # it acts as a network's Misfit does
         counts=found.share,
@@ -159,7 +166,8 @@ def learn(
 
 
 def widened(model: Extended, setting: Setting, start: Start) -> Start:
-    """Coefficients at least as free on the nominal voyages as any cause makes them in a trial."""
+    """u_i ← max(u_i, max over causes |Δθ_i|): coefficients at least as free on the nominal voyages
+    as any cause of realistic size makes them in a trial."""
     names = model.base.names
     values = dict(zip(names, start.values, strict=True))
     spread = start.spread.copy()
@@ -202,18 +210,18 @@ def assumed(
     # have in common must not look like a difference
     found = characteristics(model, setting, start, record, at, numbers)
     whole = learn(model, setting, start, record, at, found, numbers)
-    columns, known = whole.reference.columns, whole.effects.size**-2.0
-    known[columns.base : columns.linearised] = HELD_INFORMATION
+    columns, K = whole.reference.columns, whole.effects.size**-2.0
+    K[columns.base : columns.linearised] = HELD_INFORMATION
     if given:
-        known[: columns.base] = nominal_reference.GIVEN**-2.0
+        K[: columns.base] = nominal_reference.GIVEN**-2.0
     made = replace(
-        whole.reference, information=np.diag(known), pull=known * whole.reference.anchor,
+        whole.reference, information=np.diag(K), pull=K * whole.reference.anchor,
         nominal=None, adapts=not given,
     )  # fmt: skip
     return replace(
         whole,
         reference=made,
-        effects=VoyageEffects(whole.effects.deviation, known**-0.5),
+        effects=VoyageEffects(whole.effects.deviation, K**-0.5),
         each=(),
         voyage=np.zeros(0),
     )

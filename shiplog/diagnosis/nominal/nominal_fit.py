@@ -1,4 +1,16 @@
-"""The fit of a nominal campaign: where its model, its discrepancy and its noise converge."""
+"""The fit of a nominal campaign: where its model, its discrepancy and its noise converge.
+
+About coefficients θ*, with the products G of the campaign in units u (`noise`), numbers
+x = (d_θ, causes' numbers, w), the prior information K = diag(1, …, 1/s_f²) and the pull η:
+
+    V = (M + K)⁻¹,   x̂ = V (g + η),   η_θ = (θ_run - θ*)/u           all numbers
+    s_f² = mean over family f of (ŵ² + diag V_ww)                     sizes of the discrepancy
+    σ, q maximise p(e - J x̂)                                          `noise_estimate`
+    θ* ← θ* + α u x̂_θ,   α = damping · min(1, LONGEST_MOVE/max|x̂_θ|)  the next linearisation
+
+until x̂_θ is small. A move is judged by the log density of the campaign and of θ*, all other
+numbers integrated out:  log p(e | θ*) - ½ |(θ_run - θ*)/u|².
+"""
 
 from __future__ import annotations
 
@@ -58,7 +70,9 @@ def converged(
 
     Without its discrepancy a model that describes the ship badly would be moved to coefficients,
     and the noise to sizes, that make up for it. A move after which the campaign is far less
-    probable is halved. A fit that does not converge is where the campaign was most probable.
+    probable is halved. A fit that does not converge is where the campaign was most probable:
+    argmax of log p(e | θ*) - ½ |(θ_run - θ*)/u|² over the iterates, of those on which the model
+    diverges on fewest segments.
 
     Raises np.linalg.LinAlgError where the model diverges on every segment from the start.
     """
@@ -97,7 +111,7 @@ class _Iterate:
 
     @property
     def far(self) -> float:
-        """Plausible spreads that a coefficient is still to move, at most."""
+        """max |x̂_θ|: plausible spreads that a coefficient is still to move, at most."""
         return float(np.abs(self.solution.found[: len(self.theta)]).max(initial=0.0))
 
     def better(self, other: _Iterate, nats: float = 0.0) -> bool:
@@ -110,6 +124,7 @@ class _Iterate:
 
     @property
     def converged(self) -> bool:
+        """gain < NEAR and max|x̂_θ| < CLOSE."""
         return self.solution.gain < NEAR and self.far < CLOSE
 
     def at_rest(self) -> Converged:
@@ -183,12 +198,13 @@ class _Campaign:
             return None
 
     def after(self, here: _Iterate, damping: float) -> np.ndarray:
-        """Coefficients [P] one damped step on."""
+        """θ* + α u x̂_θ [P], α = damping · min(1, LONGEST_MOVE/max|x̂_θ|): one damped step on."""
         step = (here.solution.found * self.columns.unit)[: len(here.theta)]
         return here.theta + step * damping * min(1.0, LONGEST_MOVE / max(here.far, 1e-12))
 
     def _room(self, theta: np.ndarray) -> np.ndarray:
-        """[2, P] how far each coefficient may move, in units: to just inside its bounds."""
+        """((low + ε) - θ*, (high - ε) - θ*)/u [2, P]: how far each coefficient may move, in units,
+        to just inside its bounds; NO_ROOM at least."""
         edge = EDGE * (self.start.high - self.start.low)
         edge = np.where(np.isfinite(edge), edge, 0.0)
         ends = np.stack((self.start.low + edge, self.start.high - edge)) - theta
@@ -196,6 +212,7 @@ class _Campaign:
         return np.stack((np.minimum(room[0], -NO_ROOM), np.maximum(room[1], NO_ROOM)))
 
     def _whole(self, theta: np.ndarray) -> np.ndarray:
+        """(θ, 0) [C]: coefficients, and causes' numbers of zero."""
         return np.concatenate((theta, np.zeros(self.columns.linearised - self.columns.base)))
 
     def _solved(
@@ -209,9 +226,9 @@ class _Campaign:
         )
         if linear.lost.all():
             raise np.linalg.LinAlgError("the model diverges on every segment of the campaign")
-        held = anchored(self.start, theta, self.columns)
+        anchor = anchored(self.start, theta, self.columns)
         joint = _Joint(
-            linear, self.accelerations, self.columns, held, self.families, self._room(theta)
+            linear, self.accelerations, self.columns, anchor, self.families, self._room(theta)
         )
         before = joint.solved(process_noise, sizes)
         process_noise = joint.noise(before.found, process_noise, ON_THE_WAY)
@@ -223,10 +240,10 @@ class _Campaign:
 class _Solution:
     """What is most probable on one linearised campaign.
 
-    found    [C] numbers, in units, the coefficients within their bounds
+    found    x̂ [C], numbers in units, the coefficients within their bounds
     gain     log Bayes factor [nats] of moving the coefficients there in the linear model
-    weights  [W] as `discrepancy_here` gives them
-    sizes    of each family's weights
+    weights  ŵ [W] as `discrepancy_here` gives them
+    sizes    s_f of each family's weights
     value    log density [nats] of the campaign and of the coefficients where it is linearised: all
              other numbers are integrated out; segments on which the model diverges are not in it
     """
@@ -242,86 +259,98 @@ class _Solution:
 class _Joint:
     """Coefficients, causes' numbers and weights of the discrepancy on one linearised campaign.
 
-    accelerations  [S, 3J, W] of each weight; held [C] as `anchored` gives it
+    accelerations  Φ [S, 3J, W] of each weight; anchor η [C] as `anchored` gives it
     room           [2, P] least and greatest move of each coefficient, in units
     """
 
     linear: Linear
     accelerations: np.ndarray
     columns: Columns
-    held: np.ndarray
+    anchor: np.ndarray
     families: Sequence[discrepancy.Family]
     room: np.ndarray
 
     def solved(self, process_noise: ProcessNoise, sizes: Mapping[str, float]) -> _Solution:
-        """All numbers; the `sizes` of each family's weights are estimated on the way."""
+        """x̂ = V (g + η), V = (M + K)⁻¹, the coefficients within their bounds; the sizes s_f of each
+        family's weights are estimated on the way, s_f² = mean(ŵ² + diag V_ww), SIZE_STEPS times.
+        Raises np.linalg.LinAlgError where a matrix is singular."""
         by = np.concatenate(([1.0], self.columns.unit))
         modes = likelihood.modes(likelihood.weighed(self.linear, process_noise), process_noise)
         modes = modes.joined(self.accelerations)
-        total = modes.total(np.ones(len(self.linear.e))) * np.outer(by, by)
+        G = modes.total(np.ones(len(self.linear.e))) * np.outer(by, by)
         sizes = dict(sizes)
         for step in range(SIZE_STEPS + 1):
-            known = self._known(sizes)
-            inverse = np.linalg.inv(total[1:, 1:] + np.diag(known))
-            found, gain = within(inverse @ (total[1:, 0] + self.held), inverse, self.room)
+            K = self._prior_information(sizes)
+            V = np.linalg.inv(G[1:, 1:] + np.diag(K))
+            x, gain = most_probable_within(V @ (G[1:, 0] + self.anchor), V, self.room)
             if step == SIZE_STEPS or not self.families:
                 break
             for family in self.families:
-                at = family.columns
-                square = float((found[at] ** 2 + np.diagonal(inverse)[at]).mean())
+                w = family.columns
+                square = float((x[w] ** 2 + np.diagonal(V)[w]).mean())
                 sizes[family.name] = max(math.sqrt(square), LEAST_SIZE)
-        weights = discrepancy_here(total, known, self.columns)
-        value = self._density(total, known) - 0.5 * modes.log_volume()
-        return _Solution(found, gain, weights, sizes, value)
+        weights = discrepancy_here(G, K, self.columns)
+        value = self._density(G, K) - 0.5 * modes.log_volume()
+        return _Solution(x, gain, weights, sizes, value)
 
     def _density(self, total: np.ndarray, known: np.ndarray) -> float:
-        """Log density of [e | J] and of the coefficients where they are."""
+        """log p(e | θ*) - ½ |η_θ|², without the volume: log density of the campaign with all other
+        numbers integrated out (`marginal` of their rows of G), and of the coefficients."""
         base = self.columns.base
         others = np.append(0, np.arange(1 + base, len(total)))
-        known, pull = np.diag(known[base:]), self.held[base:]
-        found = marginal(total[np.ix_(others, others)], known, pull)
-        return found - 0.5 * float(self.held[:base] @ self.held[:base])
+        K, eta = np.diag(known[base:]), self.anchor[base:]
+        log_evidence = marginal(total[np.ix_(others, others)], K, eta)
+        return log_evidence - 0.5 * float(self.anchor[:base] @ self.anchor[:base])
 
-    def _known(self, sizes: Mapping[str, float]) -> np.ndarray:
-        known = self.columns.known.copy()
+    def _prior_information(self, sizes: Mapping[str, float]) -> np.ndarray:
+        """K [C]: that of the columns, and 1/s_f² of a family's weights."""
+        K = self.columns.known.copy()
         for family in self.families:
-            known[family.columns] = sizes[family.name] ** -2.0
-        return known
+            K[family.columns] = sizes[family.name] ** -2.0
+        return K
 
     def noise(self, found: np.ndarray, process_noise: ProcessNoise, rounds: int) -> ProcessNoise:
-        """Instrument and process noise of what these numbers [C] leave."""
+        """Instrument and process noise of e - J d - Zₐ Φ w, of numbers x = (d, w) [C] in units."""
         count = self.columns.linearised
         left = self.linear.less(self.accelerations @ found[count:])
         numbers = (found * self.columns.unit)[:count]
-        return noise_estimate.learnt(left, numbers, process_noise, rounds=rounds)
+        return noise_estimate.estimate(left, numbers, process_noise, rounds=rounds)
 
 
-def within(free: np.ndarray, covariance: np.ndarray, room: np.ndarray) -> tuple[np.ndarray, float]:
-    """The most probable numbers [C] with the first P of them within `room` [2, P], and the nats
-    that those gain by moving there from zero.
+def most_probable_within(
+    free: np.ndarray, covariance: np.ndarray, room: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """The most probable numbers [C] with the first P of them (θ) within `room` [2, P], and the nats
+    that those gain by moving there from zero in the linear model.
 
-    free    [C] the most probable numbers without bounds; covariance [C, C] theirs
+        x_θ = argmin (x - x̂_θ)ᵀ V_θθ⁻¹ (x - x̂_θ) within room,   gain = x_θᵀ V_θθ⁻¹ (x̂_θ - ½ x_θ)
+        x = x̂ + V_•θ V_θθ⁻¹ (x_θ - x̂_θ)
+
+    free        x̂ [C], the most probable numbers without bounds
+    covariance  V [C, C], theirs
     """
-    first = slice(room.shape[1])
-    moved = bounds.within(free[first], covariance[first, first], *room)
-    information = np.linalg.inv(covariance[first, first])
-    gain = float(moved @ information @ (free[first] - 0.5 * moved))
+    theta = slice(room.shape[1])
+    x_theta = bounds.within(free[theta], covariance[theta, theta], *room)
+    information = np.linalg.inv(covariance[theta, theta])
+    gain = float(x_theta @ information @ (free[theta] - 0.5 * x_theta))
     # the other numbers go with those that a bound keeps from where they would be
-    return free + covariance[:, first] @ information @ (moved - free[first]), gain
+    return free + covariance[:, theta] @ information @ (x_theta - free[theta]), gain
 
 
 def discrepancy_here(total: np.ndarray, known: np.ndarray, columns: Columns) -> np.ndarray:
-    """[W] most probable weights of the discrepancy, all other numbers staying where they are
-    linearised: a path is simulated with those, and follows the discrepancy from there.
+    """ŵ = (M_ww + K_ww)⁻¹ g_w [W]: most probable weights of the discrepancy, all other numbers
+    staying where they are linearised. A path is simulated with those, and follows the discrepancy
+    from there.
 
-    total   products [1 + C, 1 + C] of a campaign; known [C] information on its numbers
+    total   G [1 + C, 1 + C], products of a campaign; known   K [C], information on its numbers
     """
-    at = np.arange(columns.linearised, len(columns.unit))
-    return np.linalg.solve(total[np.ix_(1 + at, 1 + at)] + np.diag(known[at]), total[1 + at, 0])
+    w = np.arange(columns.linearised, len(columns.unit))
+    return np.linalg.solve(total[np.ix_(1 + w, 1 + w)] + np.diag(known[w]), total[1 + w, 0])
 
 
 def anchored(start: Start, theta: np.ndarray, columns: Columns) -> np.ndarray:
-    """Pull [C], in units, of the run's own coefficients on those that have moved.
+    """η [C], in units: η_θ = (θ_run - θ*)/u, the pull of the run's own coefficients on those that
+    have moved, and zero for other numbers.
 
     Forces and masses share a scale. Held to their last values instead of the run's, masses would
     halve in a few rounds, and a load would be found too light.
@@ -337,7 +366,9 @@ def hold(process_noise: ProcessNoise, acceleration: np.ndarray) -> Wide:
 
 
 def wide_of(setting: Setting) -> Wide:
-    """How far a path may be pulled, from what a ship of this size and speed does in seconds."""
+    """How far a path may be pulled, from what a ship of this length L and speed U does in seconds:
+    start 0.3 L, U, 0.3 rad, U/L; acceleration 0.1 U and 0.1 U/L a second; noise of the profile's
+    sensors, or 0.005 L, 0.03 U, 0.003 rad and 0.03 U/L where nobody states it."""
     speed, length = setting.scale["speed"], setting.scale["length"]
     turn = speed / length
     at, going, angle, turning = 0.3 * length, speed, 0.3, turn
@@ -355,5 +386,6 @@ def wide_of(setting: Setting) -> Wide:
 
 
 def columns_of(model: Extended, setting: Setting, start: Start) -> Columns:
+    """Layout of x: P coefficients in plausible spreads, then causes' numbers in realistic sizes."""
     sizes = [cause.sizes(setting) for cause in model.causes]
     return Columns(len(start.values), model.causes, np.concatenate((start.spread, *sizes)))

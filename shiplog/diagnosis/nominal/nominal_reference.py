@@ -3,7 +3,9 @@
 An error that the model has everywhere is part of it; the diagnosis tests changes only. What is
 fitted to some voyages is over-confident for others: their products count for 1/κ of themselves (a
 power prior, Ibrahim & Chen 2000). `nominal_campaign` makes it of the training voyages, and `assume`
-of a network that is diagnosed on these very voyages.
+of a network that is diagnosed on these very voyages. A trial's numbers x [C], in units, have
+
+    x ~ N(Λ⁻¹ η, Λ⁻¹)
 """
 
 from __future__ import annotations
@@ -39,10 +41,10 @@ GIVEN = 0.1  # of the plausible spread, that coefficients nobody fitted are held
 
 @dataclass(frozen=True)
 class Reference:
-    """θ that all is linearised about, and what the nominal campaign says around it.
+    """θ* that all is linearised about, and the prior x ~ N(Λ⁻¹ η, Λ⁻¹) of a trial's numbers.
 
-    information  [C, C]  and pull [C], in units of `columns.unit`; `anchor` [C] of the latter is the
-                 run's own coefficients'
+    information  Λ [C, C] and pull η [C], in units of `columns.unit`; `anchor` [C] of the latter is
+                 the run's own coefficients'
     nominal      that campaign; None where the model was trained on the very data that are diagnosed
     freedom      degrees of freedom that the voyages leave; intervals are wider with fewer
     adapts       whether the model has absorbed causes there, and is fitted again with them
@@ -69,16 +71,17 @@ class Reference:
 
     @cached_property
     def mean(self) -> np.ndarray:
-        """[C] nominal numbers, in units."""
+        """Λ⁻¹ η [C]: nominal numbers, in units."""
         return np.linalg.solve(self.information, self.pull)
 
     @cached_property
     def information_volume(self) -> float:
-        """log|information|."""
+        """log|Λ|."""
         return float(np.linalg.slogdet(self.information)[1])
 
     def apart(self, one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]) -> float:
-        """The most that a number differs, in units of its size; of the same causes."""
+        """max |q₁ - q₂|/u: the most that a number differs, in units of its size; of the same
+        causes, label → numbers q, SI."""
         columns = self.columns
         return max(
             (float(np.abs((one[n] - other[n]) / columns.unit[columns.of[n]]).max()) for n in one),
@@ -86,15 +89,16 @@ class Reference:
         )
 
     def about(self, cut: segments.Cut, g: segments.SegmentGrid) -> np.ndarray | None:
-        """Acceleration [S, 3J] that is expected at a path's knots: that of the discrepancy. A path
-        that had to do without would be off by more than the process noise, and what is not linear
-        in that would look like a change."""
+        """Φ ŵ [S, 3J]: acceleration that is expected at a path's nodes, that of the discrepancy. A
+        path that had to do without would be off by more than the process noise, and what is not
+        linear in that would look like a change."""
         if self.expected is None or self.misfit is None:
             return None
         return self.misfit.accelerations(cut, g) @ self.expected
 
     def held(self, noise_factor: float, remainder: Remainder) -> Wide:
-        """Allowed distance of a path where the process noise has this factor, with a remainder."""
+        """Allowed distance of a path, FREE √(λ² q² + p²) of the acceleration, where the process
+        noise has the factor λ = `noise_factor`, with a remainder."""
         of = remainder.in_noise(self.process_noise)
         acceleration = noise_factor * of.acceleration
         if of.intermittent is not None:
@@ -109,23 +113,24 @@ class Reference:
 
 
 def freedom(voyages: int) -> float:
-    """Degrees of it that so many voyages leave to what they have in common."""
+    """max(V - 1, 2): degrees of it that V voyages leave to what they have in common."""
     return float(max(voyages - 1, 2))
 
 
 def nominal_information(
-    total: np.ndarray, kappa: float, known: np.ndarray, held: np.ndarray
+    total: np.ndarray, kappa: float, known: np.ndarray, anchor: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Information [C, C] and pull [C] of a campaign's products [1 + C, 1 + C], which count for 1/κ
-    together with what is `known` and `held` without them."""
-    return total[1:, 1:] / kappa + np.diag(known), total[1:, 0] / kappa + held
+    """Λ = M/κ + K [C, C] and η = g/κ + η₀ [C]: of a campaign's products G [1 + C, 1 + C], which
+    count for 1/κ, together with the information K = diag(`known`) and the pull η₀ = `anchor`."""
+    return total[1:, 1:] / kappa + np.diag(known), total[1:, 0] / kappa + anchor
 
 
-def inflation(each: np.ndarray, known: np.ndarray, held: np.ndarray) -> float:
-    """κ that predicts each voyage best from the others; careful with too few.
+def inflation(each: np.ndarray, known: np.ndarray, anchor: np.ndarray) -> float:
+    """argmax_κ Σ_v log p(e_v | the other voyages; κ), of KAPPAS: κ that predicts each voyage best
+    from the others; CAREFUL_KAPPA where there are too few.
 
-    each [V, 1 + C, 1 + C] products of a voyage; what is known before any data, information and
-    pull, `known` and `held` [C]: all in units
+    each   G [V, 1 + C, 1 + C] of each voyage; `known` K and `anchor` η₀ [C], information and pull
+           before any data: all in units
     """
     if len(each) < FEWEST_VOYAGES:
         return CAREFUL_KAPPA
@@ -134,7 +139,7 @@ def inflation(each: np.ndarray, known: np.ndarray, held: np.ndarray) -> float:
     for kappa in KAPPAS:
         score = 0.0
         for left in each:
-            score += marginal(left, *nominal_information(total - left, kappa, known, held))
+            score += marginal(left, *nominal_information(total - left, kappa, known, anchor))
         scores.append(score)
     return KAPPAS[int(np.argmax(scores))]
 
@@ -143,7 +148,8 @@ def assume(
     model: Extended, setting: Setting, start: Start, record: Record, given: bool, inputs: Network
 ) -> Reference:
     """Of a network without a nominal campaign: noise, discrepancy and κ are estimated from these
-    voyages, and coefficients have their plausible spread.
+    voyages, and coefficients have their plausible spread: Λ = diag(K), η = the anchor, and K is
+    HELD_INFORMATION of causes' numbers, which have no nominal size.
 
     given    published coefficients, with a tenth of that spread, and not fitted to these voyages
     inputs   the network that trained on these voyages: the discrepancy is a function of its inputs
@@ -157,22 +163,22 @@ def assume(
     g = segments.grid(record)
     linear = linearisation.linear(model, whole, cut, g, at.path, moved, observed)
     modes = likelihood.modes(likelihood.weighed(linear, at.process_noise), at.process_noise)
-    wrong = input_misfit.of(
+    wrong = input_misfit.estimate(
         inputs, linear.cut, g, modes, columns.known, columns.unit, at.process_noise.acceleration
     )  # fmt: skip
-    held = np.append(anchored(start, at.theta, columns), np.zeros(wrong.count))
+    anchor = np.append(anchored(start, at.theta, columns), np.zeros(wrong.count))
     columns = columns.with_misfit(wrong.count)
     modes = modes.joined(wrong.accelerations(linear.cut, g))
     names = np.unique(linear.cut.voyage)
     by = np.concatenate(([1.0], columns.unit))
     each = [modes.total((linear.cut.voyage == v).astype(float)) for v in names]
-    kappa = inflation(np.stack(each) * np.outer(by, by), columns.known, held)
+    kappa = inflation(np.stack(each) * np.outer(by, by), columns.known, anchor)
     # without a nominal campaign no cause has a nominal size
-    known = columns.known.copy()
-    known[columns.base : columns.linearised] = HELD_INFORMATION
+    K = columns.known.copy()
+    K[columns.base : columns.linearised] = HELD_INFORMATION
     return Reference(
-        model, setting, at.theta, columns, at.process_noise, wide_of(setting), np.diag(known),
-        held, held, None, freedom(len(names)), adapts=not given, misfit=wrong,
+        model, setting, at.theta, columns, at.process_noise, wide_of(setting), np.diag(K),
+        anchor, anchor, None, freedom(len(names)), adapts=not given, misfit=wrong,
         counts=1.0 / min(kappa, CAREFUL_KAPPA),
     )  # fmt: skip
 

@@ -1,7 +1,12 @@
 """Placebo: what each hypothesis explains of nominal voyages, held out in turn.
 
 A cause that explains a nominal voyage, which nothing has changed, explains misfit. What it gains
-there at most is subtracted from what it gains on the trial.
+there at most is subtracted from what it gains on the trial. With the prior N(Λ⁻¹ η, Λ⁻¹) of the
+other voyages and a voyage's products G (g, M; rows a of a cause, of size s), its numbers added to
+the nominal ones have
+
+    A = M_aa - M_a (M + Λ)⁻¹ M_aᵀ,   t = g_a - M_a (M + Λ)⁻¹ (g + η)
+    log Bayes factor = ½ s² tᵀ (s² A + I)⁻¹ t - ½ log|s² A + I|
 """
 
 from __future__ import annotations
@@ -15,7 +20,9 @@ from shiplog.diagnosis.nominal.nominal_campaign import Campaign
 
 
 def placebos(campaign: Campaign) -> Mapping[str, float]:
-    """Label or family → its largest log Bayes factor on one nominal voyage, at least 0, in nats."""
+    """Label or family → max over nominal voyages and sizes s of its log Bayes factor ½ s² tᵀ (s² A
+    + I)⁻¹ t - ½ log|s² A + I|, at least 0, in nats. A voyage counts as much of itself as a trial.
+    """
     columns, share = campaign.reference.columns, campaign.reference.counts
     tested: dict[str, tuple[np.ndarray, tuple[float, ...]]]
     tested = {label: (at, (1.0,)) for label, at in columns.of.items()}
@@ -26,19 +33,20 @@ def placebos(campaign: Campaign) -> Mapping[str, float]:
         information, pull = campaign.prior_without(left_out)
         count = len(pull)
         gram = share * gram
-        both = gram[1 : 1 + count, 1 : 1 + count] + information
-        inverse = np.linalg.inv(both)
-        solution = inverse @ (gram[1 : 1 + count, 0] + pull)
+        M_Lambda = gram[1 : 1 + count, 1 : 1 + count] + information
+        V = np.linalg.inv(M_Lambda)
+        x = V @ (gram[1 : 1 + count, 0] + pull)
         for name, (at, sizes) in tested.items():
-            joined = gram[1 : 1 + count, 1 + at]
-            towards = gram[1 + at, 0] - joined.T @ solution
-            own = gram[np.ix_(1 + at, 1 + at)] - joined.T @ inverse @ joined
-            gained = max(_gained(own, towards, size) for size in sizes)
-            most[name] = max(most[name], gained)
+            M_xa = gram[1 : 1 + count, 1 + at]
+            t = gram[1 + at, 0] - M_xa.T @ x
+            A = gram[np.ix_(1 + at, 1 + at)] - M_xa.T @ V @ M_xa
+            nats = max(_log_bayes_factor(A, t, size) for size in sizes)
+            most[name] = max(most[name], nats)
     return most
 
 
-def _gained(own: np.ndarray, towards: np.ndarray, size: float) -> float:
-    whole = size**2 * own + np.eye(len(own))
-    gained = 0.5 * size**2 * float(towards @ np.linalg.solve(whole, towards))
-    return gained - 0.5 * float(np.linalg.slogdet(whole)[1])
+def _log_bayes_factor(A: np.ndarray, t: np.ndarray, size: float) -> float:
+    """½ s² tᵀ (s² A + I)⁻¹ t - ½ log|s² A + I|, nats: of numbers ~ N(0, s² I) over zero."""
+    whole = size**2 * A + np.eye(len(A))
+    explained = 0.5 * size**2 * float(t @ np.linalg.solve(whole, t))
+    return explained - 0.5 * float(np.linalg.slogdet(whole)[1])

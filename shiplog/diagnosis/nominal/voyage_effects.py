@@ -1,11 +1,13 @@
 """How far the numbers that fit one part of a campaign are from those that fit the others.
 
 A model whose equations are not the ship's has other best coefficients on every voyage. Each part of
-a campaign therefore has numbers θ + b of its own, b ~ N(0, D), and D is estimated from the nominal
+a campaign therefore has numbers x + b of its own, b ~ N(0, D), and D is estimated from the nominal
 campaign (random effects: Laird & Ware 1982). What all parts agree on stays known; what they
 disagree on is loosened. A diagonal D has one variance a group of numbers.
 
-All arrays are in units of `Columns.unit`; G is a part's products [1 + C, 1 + C] of [e | J].
+    e_i = J_i (x + b_i) + ε_i,   G_i = [e | J]ᵀ C⁻¹ [e | J] [1 + C, 1 + C] = (g₀₀, gᵀ; g, M)
+
+All arrays are in units of `Columns.unit`. F are the columns that have a b.
 """
 
 from __future__ import annotations
@@ -28,8 +30,8 @@ UNSEEN_DEVIATION = 0.02  # of numbers that the nominal campaign says nothing of
 
 @dataclass(frozen=True)
 class VoyageEffects:
-    """deviation [C]: standard deviation of b. size [C]: of θ itself, where it was learned.
-    numbers [V, C]: θ + b of every part; none where nothing was learned."""
+    """deviation [C]: D^½, standard deviation of b. size [C]: K^-½, that of x itself before any
+    data. numbers [V, C]: x + b of every part; none where nothing was estimated."""
 
     deviation: np.ndarray
     size: np.ndarray
@@ -37,33 +39,37 @@ class VoyageEffects:
 
 
 def reduced(gram: np.ndarray, deviation: np.ndarray) -> tuple[np.ndarray, float]:
-    """A part's products with its own b integrated out, and log|I + D^½ M D^½|.
+    """G - G_•F D^½ (I + D^½ M_FF D^½)⁻¹ D^½ G_F•, a part's products with its own b integrated out,
+    and log|I + D^½ M_FF D^½|.
 
-    gram        [1 + C, 1 + C]
-    deviation   [C]
+    gram        G [1 + C, 1 + C]
+    deviation   D^½ [C]; F where it is greater than zero
+
+    Raises np.linalg.LinAlgError where the products are not those of a covariance.
     """
-    free = np.flatnonzero(deviation > 0.0)
-    if not len(free):
+    F = np.flatnonzero(deviation > 0.0)
+    if not len(F):
         return gram, 0.0
-    own = deviation[free]
-    inner = np.outer(own, own) * gram[np.ix_(1 + free, 1 + free)]
-    inner[np.diag_indices(len(free))] += 1.0
-    root = cholesky(inner, lower=True, check_finite=False)
-    half = solve_triangular(root, own[:, None] * gram[1 + free], lower=True, check_finite=False)
-    return gram - half.T @ half, 2.0 * float(np.log(np.diagonal(root)).sum())
+    D_half = deviation[F]
+    A = np.outer(D_half, D_half) * gram[np.ix_(1 + F, 1 + F)]
+    A[np.diag_indices(len(F))] += 1.0
+    L = cholesky(A, lower=True, check_finite=False)  # L Lᵀ = I + D^½ M D^½
+    half = solve_triangular(L, D_half[:, None] * gram[1 + F], lower=True, check_finite=False)
+    return gram - half.T @ half, 2.0 * float(np.log(np.diagonal(L)).sum())
 
 
 def own_numbers(gram: np.ndarray, common: np.ndarray, deviation: np.ndarray) -> np.ndarray:
-    """b [C] of one part, most probable given θ, and zero where it has none.
+    """b_F = (M_FF + D⁻¹)⁻¹ (g_F - M_F x) [C] of one part, most probable given x, and zero where it
+    has none.
 
-    gram       products [1 + C, 1 + C] of the part, or of more columns behind these
-    common     θ [C]
-    deviation  [C] of b
+    gram       G [1 + C, 1 + C] of the part, or of more columns behind these
+    common     x [C]
+    deviation  D^½ [C] of b
     """
-    b, free = np.zeros(len(common)), np.flatnonzero(deviation > 0.0)
-    own = gram[np.ix_(1 + free, 1 + free)] + np.diag(deviation[free] ** -2.0)
-    left = gram[1 + free, 0] - gram[1 + free, 1 : 1 + len(common)] @ common
-    b[free] = np.linalg.solve(own, left)
+    b, F = np.zeros(len(common)), np.flatnonzero(deviation > 0.0)
+    M_FF = gram[np.ix_(1 + F, 1 + F)] + np.diag(deviation[F] ** -2.0)
+    left = gram[1 + F, 0] - gram[1 + F, 1 : 1 + len(common)] @ common
+    b[F] = np.linalg.solve(M_FF, left)
     return b
 
 
@@ -77,10 +83,12 @@ def learn(
     """D by expectation-maximisation (Dempster, Laird & Rubin 1977), each round three steps of it of
     which the first two say how far the third may leap (SQUAREM, Varadhan & Roland 2008).
 
-    each     products of every part
-    known    [C] information on θ before any data; `pull` [C] what it pulls towards
-    groups   columns that share one variance; other columns have none
-    sized    columns whose prior size (the same in every part) is learned too
+    each     G of every part
+    known    K [C], information on x before any data; `pull` η [C], what it pulls towards
+    groups   columns that share one variance of D; other columns have none
+    sized    columns whose prior size K^-½ (the same in every part) is estimated too
+
+    Raises np.linalg.LinAlgError where a matrix is singular.
     """
     free = np.sort(np.concatenate([np.zeros(0, int), *groups]))
     problem = _EffectsProblem(
@@ -105,7 +113,7 @@ def learn(
 
 @dataclass(frozen=True)
 class _Part:
-    """Products M [C, C] and g [C] of a part, and the rows of both that have a b [F]."""
+    """M [C, C] and g [C] of a part; M_F [F, C] and g_F [F], their rows that have a b; M_FF."""
 
     m: np.ndarray
     g: np.ndarray
@@ -115,14 +123,15 @@ class _Part:
 
     @classmethod
     def of(cls, gram: np.ndarray, free: np.ndarray) -> _Part:
+        """M = G₁₁, g = G₁₀ and their rows F = `free` of a part's products G."""
         m, g = np.ascontiguousarray(gram[1:, 1:]), gram[1:, 0]
         return cls(m, g, m[free], g[free], m[np.ix_(free, free)])
 
 
 @dataclass(frozen=True)
 class _EffectsProblem:
-    """Parts with what is known of θ, and which columns share one variance; `free` [F] are those
-    of all groups."""
+    """Parts with what is known of x (K, η), and which columns share one variance; `free` F are
+    those of all groups."""
 
     parts: list[_Part]
     free: np.ndarray
@@ -132,7 +141,7 @@ class _EffectsProblem:
     sized: list[np.ndarray]
 
     def spread(self, sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Variance [C] of b, and information [C] on θ, of the logarithms of all variances."""
+        """D [C] and K [C], of the logarithms of all variances: groups first, then sizes."""
         variance, known = np.zeros(len(self.known)), self.known.copy()
         for columns, size in zip(self.groups, sizes, strict=False):
             variance[columns] = math.exp(size)
@@ -141,36 +150,44 @@ class _EffectsProblem:
         return variance, known
 
     def step(self, sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """One step of expectation-maximisation: logarithms of the variances, and θ + b [V, C]."""
-        variance, known = self.spread(np.clip(sizes, *BOUNDS))
-        free = self.free
-        deviation = np.sqrt(variance[free])
-        scale = np.outer(deviation, deviation)
-        information, towards, inner = np.diag(known), self.pull.copy(), []
+        """One step of expectation-maximisation: logarithms of the variances, and x + b [V, C].
+
+            S_i = (D⁻¹ + M_FF)⁻¹,  T_i = S_i M_F        b_i | x ~ N(S_i g_F - T_i x, S_i)
+            V = (K + Σ_i M - M_Fᵀ T_i)⁻¹,  x̂ = V (η + Σ_i g - T_iᵀ g_F)         x ~ N(x̂, V)
+            E b_i² = (S_i g_F - T_i x̂)² + diag S_i + diag T_i V T_iᵀ,  E x² = x̂² + diag V
+
+        The new variance of a group is the mean of E b² over its columns and all parts, that of a
+        size the mean of E x² over its columns.
+        """
+        D, K = self.spread(np.clip(sizes, *BOUNDS))
+        F = self.free
+        D_half = np.sqrt(D[F])
+        scale = np.outer(D_half, D_half)
+        information, pull, of_parts = np.diag(K), self.pull.copy(), []
         for part in self.parts:
-            spread = _inverse(np.eye(len(free)) + scale * part.both) * scale  # (D⁻¹ + M)⁻¹
-            gain = spread @ part.own
-            information += part.m - part.own.T @ gain
-            towards += part.g - gain.T @ part.own_g
-            inner.append((spread, gain))
-        covariance = _inverse(information)
-        mean = covariance @ towards
-        second = np.zeros(len(variance))
-        numbers = np.repeat(mean[None], len(self.parts), axis=0)
-        for own_numbers, (spread, gain), part in zip(numbers, inner, self.parts, strict=True):
-            found = spread @ part.own_g - gain @ mean
-            own_numbers[free] += found
-            second[free] += found**2 + np.diagonal(spread)
-            second[free] += ((gain @ covariance) * gain).sum(1)
-        squares = mean**2 + np.diagonal(covariance)
+            S = _inverse(np.eye(len(F)) + scale * part.both) * scale  # (D⁻¹ + M)⁻¹
+            T = S @ part.own
+            information += part.m - part.own.T @ T
+            pull += part.g - T.T @ part.own_g
+            of_parts.append((S, T))
+        V = _inverse(information)
+        x = V @ pull
+        b_squares = np.zeros(len(D))
+        numbers = np.repeat(x[None], len(self.parts), axis=0)
+        for x_b, (S, T), part in zip(numbers, of_parts, self.parts, strict=True):
+            b = S @ part.own_g - T @ x
+            x_b[F] += b
+            b_squares[F] += b**2 + np.diagonal(S)
+            b_squares[F] += ((T @ V) * T).sum(1)
+        x_squares = x**2 + np.diagonal(V)
         count = len(self.parts)
-        moved = [_mean(second[c].sum(), count * len(c)) for c in self.groups]
-        moved += [_mean(squares[c].sum(), len(c)) for c in self.sized]
-        return np.log(np.array(moved)), numbers
+        variances = [_mean(b_squares[c].sum(), count * len(c)) for c in self.groups]
+        variances += [_mean(x_squares[c].sum(), len(c)) for c in self.sized]
+        return np.log(np.array(variances)), numbers
 
 
 def _inverse(matrix: np.ndarray) -> np.ndarray:
-    """Of a positive definite matrix. Raises np.linalg.LinAlgError where it is not."""
+    """A⁻¹ = L⁻ᵀ L⁻¹, A = L Lᵀ positive definite. Raises np.linalg.LinAlgError where it is not."""
     if not len(matrix):
         return matrix
     root = cholesky(matrix, lower=True, check_finite=False)
@@ -182,5 +199,5 @@ def _inverse(matrix: np.ndarray) -> np.ndarray:
 
 
 def _mean(total: float, count: int) -> float:
-    """Mean square, one pseudo-observation of LEAST_DEVIATION among the others."""
+    """(Σ b² + LEAST_DEVIATION²)/(n + 1): mean square, one pseudo-observation among the others."""
     return (total + LEAST_DEVIATION**2) / (count + 1.0)

@@ -1,4 +1,8 @@
-"""Where a model errs: by channel, outside its training data, where an external force acts."""
+"""Where a model errs: by channel, outside its training data, where an external force acts.
+
+All of it is of the residual e - J d of the model as it stands, its discrepancy and the parts' own
+numbers taken out.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +33,7 @@ from shiplog.voyages.store.store import Store
 from shiplog.voyages.windows.windows import Windows
 
 
-def external(
+def find_external_forces(
     trial: Trial, point: Point, whole: Linear, remainder: Remainder, nominal: Record | None
 ) -> tuple[list[Interval], np.ndarray]:
     """Stretches that no force of the ship explains, and the segments [S] bool that they touch: what
@@ -43,7 +47,7 @@ def external(
     residual, d = fits.residual(trial, fits.of_parts(trial, whole, fit), fit)
     process_noise = trial.process_noise(remainder, whole.cut).times(base.noise_factor)
     found: tuple[external_forces.Stretch, ...] = ()
-    if external_forces.driven(physics):
+    if external_forces.has_propulsion(physics):
         weighed = external_forces.balance(residual, d, process_noise, trial.record, physics, values)
         found = external_forces.find(weighed, trial.record)
         if found and nominal is not None:
@@ -70,7 +74,7 @@ def _nominal_excess(trial: Trial, nominal: Record) -> np.ndarray | None:
     return external_forces.largest_excess(weighed, nominal)
 
 
-def by_channel(held: HeldOut) -> list[dict]:
+def errors_by_channel(held: HeldOut) -> list[dict]:
     """Shares of the error of the windows, as the contract's `wrong`."""
     shares, _ = campaign(held.trial.record)
     share = [shares.get(v, (1.0, 1.0))[0] for v in held.voyages]
@@ -80,7 +84,7 @@ def by_channel(held: HeldOut) -> list[dict]:
     return [c.as_json() for c in found.channels]
 
 
-def depends_on(trial: Trial, nothing: Fit, whole: Linear) -> tuple[Dependence, ...]:
+def find_omitted_inputs(trial: Trial, nothing: Fit, whole: Linear) -> tuple[Dependence, ...]:
     """What the model cannot see and the residual depends on, with no cause named."""
     found = residual_acceleration.posterior(
         *fits.residual(trial, whole, nothing),
@@ -93,7 +97,7 @@ def depends_on(trial: Trial, nothing: Fit, whole: Linear) -> tuple[Dependence, .
     )
 
 
-def uncovered(
+def uncovered_windows(
     run: Run, store: Store, names: Sequence[str], profile: Profile, cut: Windows
 ) -> list[Interval]:
     """Windows outside the training data."""

@@ -3,7 +3,12 @@
 The residual acceleration times mass and added mass is compared with the largest force of the ship:
 screws at full power, rudders at every angle in their slipstream, wind, hull, and the model's
 nominal error. A larger force is external. Where the nominal voyages have as large a force, which
-nothing pushed, it is an error of the model and not external.
+nothing pushed, it is an error of the model and not external. At each node, in each channel,
+
+    F = M a,  sd² = M² sd_a²,  a | e ~ N(â, sd_a²)                              `balance`
+    own = |X_H(x)| + bollard forces + (1.2 U_A)² max_α |X_A(α)|
+    misfit = √max((1.4826 median|F|)² - median(sd)², 0)                of the whole record
+    |F| - own - EXTERNAL_SPREADS sd > max(EXTERNAL_MISFIT misfit, nominal excess)   `find`
 """
 
 from __future__ import annotations
@@ -39,7 +44,7 @@ DOUBT = 5.0  # s around a jump of position or heading, where velocities are not 
 SHORTEST_S = 2.0  # s of an event
 GAP = 5.0  # s: after a shorter break it is still the same event
 EDGE = 0.5  # an event begins and ends where its force passes half of the peak
-LOOSE = 0.5  # of its full acceleration: how far the knots may go before data pull them
+LOOSE = 0.5  # of its full acceleration: how far the nodes may go before data pull them
 ANGLES = 13  # settings of a rudder that are tried
 TOWARDS = (("ahead", "astern"), ("to starboard", "to port"), ("to starboard", "to port"))
 
@@ -81,11 +86,11 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Balance:
-    """Along K knots, in order, X, Y [N] and N [N m] at midship.
+    """Along K nodes, in order, X, Y [N] and N [N m] at midship.
 
     rows   [K]     of the record
-    force  [K, 3]  unexplained
-    sd     [K, 3]
+    force  [K, 3]  F = M a, unexplained
+    sd     [K, 3]  its standard deviation
     own    [K, 3]  what ship, wind and hull could add there
     misfit [3]     what the model misses always
     full   [3]     the ship's own means, at bollard
@@ -100,11 +105,12 @@ class Balance:
 
     @property
     def excess(self) -> np.ndarray:
-        """[K, 3] N, N and N m by which the force significantly exceeds the ship's own."""
+        """|F| - own - EXTERNAL_SPREADS sd [K, 3] N, N and N m, by which the force significantly
+        exceeds the ship's own."""
         return np.abs(self.force) - self.own - thresholds.EXTERNAL_SPREADS * self.sd
 
 
-def driven(physics: MMG) -> bool:
+def has_propulsion(physics: MMG) -> bool:
     """Whether it is known what drives the ship: else no force can be called external."""
     return bool(physics.geometry.propellers or physics.geometry.thrusters)
 
@@ -112,7 +118,8 @@ def driven(physics: MMG) -> bool:
 def find(
     weighed: Balance, record: Record, nominal_excess: np.ndarray | None = None
 ) -> tuple[Stretch, ...]:
-    """All events of a record, in order of voyage and time.
+    """Stretches in which excess > max(EXTERNAL_MISFIT misfit, nominal excess): all events of a
+    record, in order of voyage and time.
 
     nominal_excess  [3] N, N and N m, as `largest_excess` gives it for the nominal voyages; None
                     without any
@@ -132,7 +139,8 @@ def find(
 
 
 def largest_excess(weighed: Balance, record: Record) -> np.ndarray:
-    """[3] N, N and N m: the most by which the forces of a record exceed the ship's own."""
+    """max over nodes of excess [3] N, N and N m, at least 0: the most by which the forces of a
+    record exceed the ship's own."""
     kept = ~_contradicted(record, weighed.rows)
     return weighed.excess[kept].max(0, initial=0.0)
 
@@ -145,42 +153,46 @@ def balance(
     physics: MMG,
     values: np.ndarray,
 ) -> Balance:
-    """The forces that `find` judges.
+    """The forces that `find` judges: F = M a and sd, own, misfit (the module's equations). The
+    process noise is as loose as LOOSE times the acceleration that the ship's own means could make,
+    M⁻¹ `full`.
 
     linear   of a record's segments, best those of `residual_acceleration.covering`
-    d        [C] the columns' numbers
+    d        [C] the columns' numbers, SI
     physics  an MMG of the ship, for masses and means, with its coefficients `values` [P]
     """
-    weigh = masses(physics, values).T
-    full = means(record, physics, values)
-    reach = np.abs(np.linalg.solve(weigh, full))
+    M = masses(physics, values).T
+    full = largest_own_forces(record, physics, values)
+    reach = np.abs(np.linalg.solve(M, full))
     loose = replace(
         process_noise, acceleration=np.maximum(process_noise.acceleration, LOOSE * reach)
     )
     rows, acceleration, sd = _knots(residual_acceleration.posterior(linear, d, loose, record))
-    force = acceleration @ weigh.T
-    doubt = np.sqrt(sd**2 @ weigh.T**2)
-    spread = 1.4826 * np.median(np.abs(force), axis=0)
-    misfit = np.sqrt(np.maximum(spread**2 - np.median(doubt, axis=0) ** 2, 0.0))
-    state = residual_acceleration.around(record, record.state, rows)
-    actuator = residual_acceleration.around(record, record.actuator, rows)
+    F = acceleration @ M.T
+    sd_F = np.sqrt(sd**2 @ M.T**2)
+    spread = 1.4826 * np.median(np.abs(F), axis=0)
+    misfit = np.sqrt(np.maximum(spread**2 - np.median(sd_F, axis=0) ** 2, 0.0))
+    state = residual_acceleration.means_about(record, record.state, rows)
+    actuator = residual_acceleration.means_about(record, record.actuator, rows)
     own = np.abs(_forces(physics, values, state, actuator)["hull"])
     own += np.where(_resting(record, physics, rows), RESTING, 1.0)[:, None] * full
     if physics.geometry.wind:
         angle = np.linspace(0.0, 2.0 * math.pi, 73)
         worst = np.abs(np.asarray(_of_wind(physics, values, np.cos(angle), np.sin(angle)))).max(0)
-        speed = np.linalg.norm(residual_acceleration.around(record, record.wind, rows), axis=1)
+        speed = np.linalg.norm(residual_acceleration.means_about(record, record.wind, rows), axis=1)
         own += (GUST * speed[:, None]) ** 2 * worst
-    return Balance(rows, force, doubt, own, misfit, full)
+    return Balance(rows, F, sd_F, own, misfit, full)
 
 
 def masses(physics: MMG, values: np.ndarray) -> np.ndarray:
-    """[3, 3] force X, Y, N that 1 m/s² of surge, of sway and 1 rad/s² take, one a row."""
+    """Mᵀ [3, 3]: force X, Y, N [N, N, N m] that 1 m/s² of surge, of sway and 1 rad/s² take, one a
+    row."""
     return np.asarray(_masses(physics, values))
 
 
 @traced
 def _masses(physics, values):
+    """Forces of unit accelerations, (X, Y, N) = M (u̇, v̇, ṙ), one a row."""
     return body.forces_of(named(physics.names, values), physics.geometry, jnp.eye(3))
 
 
@@ -189,8 +201,9 @@ def _of_wind(physics, values, ahead, starboard):
     return air.wind(named(physics.names, values), physics.geometry, ahead, starboard)
 
 
-def means(record: Record, physics: MMG, values: np.ndarray) -> np.ndarray:
-    """|X|, |Y|, |N| [3] that screws, rudders and thrusters could make of a ship at rest.
+def largest_own_forces(record: Record, physics: MMG, values: np.ndarray) -> np.ndarray:
+    """Σ_units max over settings (|X|, |Y|, |N|) [3], N, N and N m: what screws, rudders and
+    thrusters could make of a ship at rest.
 
     Unit by unit, each at its worst for each channel: more than any one setting of all of them.
     """
@@ -242,7 +255,7 @@ def _ranges(record: Record) -> list[np.ndarray]:
 
 
 def _resting(record: Record, physics: MMG, rows: np.ndarray) -> np.ndarray:
-    """[K] bool: no screw has turned for JETS_GONE_S."""
+    """max |n|/n_max ≤ STILL over the JETS_GONE_S before a node [K]: no screw has turned."""
     drives = [u.column for u in (*physics.geometry.propellers, *physics.geometry.thrusters)]
     ranges = _ranges(record)
     most = np.array([np.abs(ranges[i]).max() for i in drives])
@@ -276,14 +289,14 @@ def _contradicted(record: Record, rows: np.ndarray) -> np.ndarray:
 
 def _knots(found: Unexplained) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Rows [K] in order, means and standard deviations [K, 3], each instant once."""
-    keep = residual_acceleration.once(found)
+    keep = residual_acceleration.unique_instants(found)
     order = np.argsort(found.rows[keep])
     mean, sd = (np.moveaxis(v, 1, -1)[keep][order] for v in (found.mean, found.sd))
     return found.rows[keep][order], mean, sd
 
 
 def _unbroken(record: Record, rows: np.ndarray) -> Iterator[slice]:
-    """Knots that follow each other."""
+    """Nodes that follow each other."""
     apart = (np.diff(record.firsts[rows]) != 0) | (
         np.diff(record.time[rows]) > 1.5 * record.timescale.knot
     )
@@ -295,8 +308,8 @@ def _event(
     record: Record, weighed: Balance, limit: np.ndarray, part: slice, channel: int, first: int,
     last: int,
 ) -> tuple[float, Stretch]:  # fmt: skip
-    """How far beyond its limit, of the knots of the part; and the event: knots first to last, and
-    on to where the force has fallen to EDGE of its peak."""
+    """max |F|/limit over the nodes of the part; and the event: nodes first to last, and on to where
+    the force has fallen to EDGE of its peak."""
     force, rows = np.abs(weighed.force[part, channel]), weighed.rows[part]
     at = first + int(force[first : last + 1].argmax())
     share, time = force / force[at], record.time[rows]

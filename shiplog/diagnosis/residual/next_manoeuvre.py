@@ -1,7 +1,11 @@
 """The manoeuvre that would separate two causes, and its expected evidence, simulated in advance.
 
-The expected evidence is the information of the simulated manoeuvre about a cause's numbers, without
-the part that coefficients, nominal numbers or the other cause could imitate.
+The expected evidence is the information of the simulated manoeuvre about a cause's numbers p,
+without the part that coefficients, nominal numbers or the other cause could imitate: with products
+κ M of the manoeuvre, the prior information Λ, and rows a of the cause and b of the other,
+
+    A = κ M - κ M (κ M + Λ)⁻¹ κ M
+    nats = ½ (pᵀ A_aa p - (A_ba p)ᵀ (A_bb + I)⁻¹ (A_ba p))
 """
 
 from __future__ import annotations
@@ -45,6 +49,7 @@ class Manoeuvre:
 
 
 def _still(t: np.ndarray, share: float) -> np.ndarray:
+    """The same share at all times t [n]."""
     return np.full(len(t), share)
 
 
@@ -102,11 +107,11 @@ def advice(
     alike = {n.cause.label: n for n in named if n.alike}
     if not alike:
         return {}
-    grams, factor = sailed(trial, fixed), trial.record.timescale.factor
+    grams, factor = products_of_manoeuvres(trial, fixed), trial.record.timescale.factor
     found = {}
     for label, one in alike.items():
         worth = {
-            m.text(factor): min(apart(trial, gram, one, other) for other in one.alike)
+            m.text(factor): min(separation(trial, gram, one, other) for other in one.alike)
             for m, gram in zip(MANOEUVRES, grams, strict=True)
             if gram is not None
         }
@@ -116,21 +121,28 @@ def advice(
     return found
 
 
-def apart(trial: Trial, gram: np.ndarray, one: Named, other: str) -> float:
-    """Nats by which a cause as found would beat another, of a gram [1 + C, 1 + C] in units. The
-    manoeuvre counts as much of itself as a trial does."""
+def separation(trial: Trial, gram: np.ndarray, one: Named, other: str) -> float:
+    """½ (pᵀ A_aa p - (A_ba p)ᵀ (A_bb + I)⁻¹ (A_ba p)): nats by which a cause a, with its numbers p
+    as they were found, would beat another, b.
+
+    gram   G [1 + C, 1 + C] of a manoeuvre, in units, with M its block of numbers. A = κM - κM (κM
+           + Λ)⁻¹ κM: a manoeuvre counts as much of itself, κ, as a trial does.
+    """
     columns = trial.reference.columns
-    own, rival = columns.of[one.cause.label], columns.of[other]
-    g = trial.reference.counts * gram[1:, 1:]
-    left = g - g @ np.linalg.solve(g + trial.reference.information, g)
-    p = one.numbers / columns.unit[own]
-    imitated = left[np.ix_(rival, own)] @ p
-    free = left[np.ix_(rival, rival)] + np.eye(len(rival))
-    return 0.5 * float(p @ left[np.ix_(own, own)] @ p - imitated @ np.linalg.solve(free, imitated))
+    a, b = columns.of[one.cause.label], columns.of[other]
+    M = trial.reference.counts * gram[1:, 1:]
+    A = M - M @ np.linalg.solve(M + trial.reference.information, M)
+    p = one.numbers / columns.unit[a]
+    A_ba_p = A[np.ix_(b, a)] @ p
+    A_bb = A[np.ix_(b, b)] + np.eye(len(b))
+    return 0.5 * float(p @ A[np.ix_(a, a)] @ p - A_ba_p @ np.linalg.solve(A_bb, A_ba_p))
 
 
-def sailed(trial: Trial, fixed: Mapping[str, np.ndarray]) -> list[np.ndarray | None]:
-    """[1 + C, 1 + C] of each manoeuvre, in units; None where the model diverges in it."""
+def products_of_manoeuvres(
+    trial: Trial, fixed: Mapping[str, np.ndarray]
+) -> list[np.ndarray | None]:
+    """G = Σ_s G_s [1 + C, 1 + C] of each manoeuvre, in units, its segments linearised as a trial's
+    are; None where the model diverges in it."""
     ref = trial.reference
     numbers = dict(fixed)
     whole = np.concatenate((ref.theta, ref.columns.numbers(numbers)))
@@ -196,7 +208,7 @@ def simulated(trial: Trial, theta: np.ndarray) -> tuple[Record, np.ndarray]:
 
 
 def driven(record: Record, manoeuvre: Manoeuvre, time: np.ndarray) -> np.ndarray:
-    """[n, A] SI: shares of the range of each actuator, nineteen times of twenty."""
+    """share(t) · quantile₀.₉₅|actuator| [n, A], SI; of a rudder or an azimuth HARD at most."""
     thrust, steering = manoeuvre.drive(time)
     most = np.quantile(np.abs(record.actuator[record.measured]), 0.95, axis=0)
     columns = []

@@ -2,7 +2,17 @@
 
 The inputs of a model are velocities, actuators and apparent wind. Heading, place, time and recent
 changes of the controls are not. If they predict the residual on held-out voyages, a term is missing
-that a new fit of the model cannot provide.
+that a new fit of the model cannot provide. With accelerations y [K, 3] at nodes and features X of
+the model's own inputs (X₀), and of an omitted one in addition (X₁):
+
+    W_f(λ) = (X̃ᵀ X̃ + λ n I)⁻¹ X̃ᵀ ỹ            without fold f; ~ less the means without f
+    E_f(λ) = Σ_{k in f} (y_k - ȳ - W_fᵀ (x_k - x̄))²           squared error on fold f [3]
+    λ_f = argmin of the same error on the other folds, each left out too (nested cross-validation)
+    E = Σ_f E_f(λ_f),   R² = (min(E(X₀), E(∅)) - E(X₀, X₁))/min(E(X₀), E(∅))
+
+All of it is done on sums of products over folds. R² is significant where it exceeds what shifted
+or exchanged values of the omitted input reach (SHIFTS draws; greatest, and mean and BEYOND standard
+deviations), and LEAST_R2.
 """
 
 from __future__ import annotations
@@ -50,8 +60,8 @@ class Dependence:
 
 
 @dataclass(frozen=True)
-class _Knots:
-    """What the regressions share, K knots in order of voyage and time.
+class _Nodes:
+    """What the regressions share, K nodes in order of voyage and time.
 
     y        [K, 3]  accelerations, outliers cut
     visible  [K, G]  a rough model's features of all inputs of the model
@@ -67,7 +77,7 @@ class _Knots:
     folds: np.ndarray
 
 
-Indices = np.ndarray  # [K] which knot's unseen variable goes with each knot
+Indices = np.ndarray  # [K] which node's unseen variable goes with each node
 
 
 def table(
@@ -77,16 +87,17 @@ def table(
     shifts: int = SHIFTS,
     knot: float = KNOT,
 ) -> tuple[Dependence, ...]:
-    """One row each for heading, position, time and controls.
+    """R² of each channel: one row each for heading, position, time and controls.
 
-    knots   of `residual_acceleration.table`, or the same columns of any other model's residual
+    knots   nodes of `residual_acceleration.table`, or the same columns of any other model's
+            residual
     rng     draws the shifts
-    knot    s between knots
+    knot    s between nodes
 
     R² is beyond what a regression on the model's inputs predicts; that of position also beyond
     heading, or every steady force would count as a matter of place.
     """
-    shared, folds = _knots(knots, profile)
+    shared, folds = _nodes(knots, profile)
     psi = knots["heading"].to_numpy()
     heading = _heading(psi, shared.carried)
     designs: dict[str, tuple[Callable[[Indices], np.ndarray], np.ndarray]] = {
@@ -119,7 +130,9 @@ def _three(values: np.ndarray) -> tuple[float, float, float]:
     return float(values[0]), float(values[1]), float(values[2])
 
 
-def _knots(knots: pl.DataFrame, profile: Profile) -> tuple[_Knots, str]:
+def _nodes(knots: pl.DataFrame, profile: Profile) -> tuple[_Nodes, str]:
+    """y, X₀ = (u, v, r, u|u|, v|v|, r|r|, uv, ur, vr, wind, drive), what carries a missing effect
+    (1, u, v, r, drive), and the folds with their name. y is cut at OUTLIER robust deviations."""
     y = knots.select(ACCELERATIONS).to_numpy()
     middle = np.median(y, axis=0)
     reach = OUTLIER * 1.4826 * np.median(np.abs(y - middle), axis=0)
@@ -134,11 +147,12 @@ def _knots(knots: pl.DataFrame, profile: Profile) -> tuple[_Knots, str]:
     )
     carried = np.concatenate((np.ones((len(y), 1)), motion, drive), 1)
     folds, name = _folds(runs)
-    return _Knots(np.clip(y, middle - reach, middle + reach), visible, carried, runs, folds), name
+    return _Nodes(np.clip(y, middle - reach, middle + reach), visible, carried, runs, folds), name
 
 
 def _drive(knots: pl.DataFrame, profile: Profile) -> np.ndarray:
-    """[K, D]: thrust of each screw as n|n|, and all of it turned by each angle."""
+    """(nᵢ|nᵢ|)ᵢ, (Σ n|n|) sin δⱼ, (Σ n|n|) cos δⱼ [K, D]: thrust of each screw, over its root mean
+    square, and all of it turned by each angle."""
     values = {a.name: knots[a.name].to_numpy() for a in profile.actuators}
     strengths = [
         values[a.name] * np.abs(values[a.name])
@@ -165,7 +179,7 @@ def _folds(runs: np.ndarray) -> tuple[np.ndarray, str]:
 
 
 def _unit(values: np.ndarray) -> np.ndarray:
-    """Columns over their root mean square; a column of zeros stays."""
+    """x/√mean(x²): columns over their root mean square; a column of zeros stays."""
     return values / np.maximum(np.sqrt((values**2).mean(0)), 1e-12)
 
 
@@ -174,11 +188,12 @@ def _times(left: np.ndarray, right: np.ndarray) -> np.ndarray:
     return (left[:, :, None] * right[:, None, :]).reshape(len(left), -1)
 
 
-# --- features of the unseen variables, as at knot i for knot k ------------------------------------
+# --- features of the unseen variables, as at node i for node k ------------------------------------
 
 
 def _heading(psi: np.ndarray, carried: np.ndarray) -> Callable[[Indices], np.ndarray]:
-    """Harmonics; and the first one, that of an earth-fixed vector, with what carries it."""
+    """cos kψ, sin kψ, k = 1, 2, 3; and the first one, that of an earth-fixed vector, times what
+    carries it."""
     harmonics = np.stack([turn(k * psi) for k in (1, 2, 3) for turn in (np.cos, np.sin)], 1)
 
     def features(at: Indices) -> np.ndarray:
@@ -189,7 +204,8 @@ def _heading(psi: np.ndarray, carried: np.ndarray) -> Callable[[Indices], np.nda
 
 
 def _position(place: np.ndarray, psi: np.ndarray) -> Callable[[Indices], np.ndarray]:
-    """Bumps over the places it was at: forces in body axes, and earth-fixed ones turned there."""
+    """exp(-½ |p - c|²/w²) (1, cos ψ, sin ψ): bumps about centres c of the places it was at, w their
+    median distance: forces in body axes, and earth-fixed ones turned there."""
     centres = [place.mean(0)]
     for _ in range(MAP_CENTRES - 1):  # each as far as can be from those before
         away = np.min([((place - c) ** 2).sum(1) for c in centres], axis=0)
@@ -203,15 +219,17 @@ def _position(place: np.ndarray, psi: np.ndarray) -> Callable[[Indices], np.ndar
 
 
 def _time(share: np.ndarray, carried: np.ndarray) -> Callable[[Indices], np.ndarray]:
+    """t and t² times what carries the effect, t = 2 share - 1, from -1 to 1 over the campaign."""
     t = 2.0 * share - 1.0
     powers = np.stack((t, t**2), 1)
     return lambda at: _times(powers[at], carried)
 
 
 def _controls(
-    knots: pl.DataFrame, profile: Profile, shared: _Knots, knot: float
+    knots: pl.DataFrame, profile: Profile, shared: _Nodes, knot: float
 ) -> Callable[[Indices], np.ndarray]:
-    """What each actuator did over the last knot; nothing where a stretch begins."""
+    """Δu_i times what carries the effect: what each actuator did since the node before; nothing
+    where a stretch begins."""
     values = knots.select(profile.actuator_names).to_numpy()
     step = np.diff(knots["time_s"].to_numpy(), prepend=-np.inf)
     follows = (np.diff(shared.runs, prepend=-1) == 0) & (step < 1.5 * knot)
@@ -239,8 +257,9 @@ def _exchanged(runs: np.ndarray, time: np.ndarray, rng: np.random.Generator) -> 
 # --- ridge regression on sums, voyages left out ---------------------------------------------------
 
 
-def _gains(shared: _Knots, known: np.ndarray, designs: list[np.ndarray]) -> np.ndarray:
-    """[D, 3] share of the variance that each design predicts beyond `known`."""
+def _gains(shared: _Nodes, known: np.ndarray, designs: list[np.ndarray]) -> np.ndarray:
+    """R² = (E₀ - E(X₀, X₁))/E₀ [D, 3], E₀ = min(E(X₀), E(∅)): share of the variance that each
+    design X₁ predicts beyond X₀ = `known`."""
     whole = np.zeros((len(shared.y), 0))
     total, before = (_left_out(shared, x) for x in (whole, known))
     after = np.stack([_left_out(shared, np.concatenate((known, x), 1)) for x in designs])
@@ -249,56 +268,64 @@ def _gains(shared: _Knots, known: np.ndarray, designs: list[np.ndarray]) -> np.n
     return (base - after) / np.maximum(base, 1e-300)
 
 
-def _left_out(shared: _Knots, features: np.ndarray) -> np.ndarray:
-    """[3] squared error on each fold in turn, the penalty chosen among the other folds."""
+def _left_out(shared: _Nodes, features: np.ndarray) -> np.ndarray:
+    """Σ_f E_f(λ_f) [3]: squared error on each fold f in turn, the penalty chosen among the others:
+
+        λ_f = argmin_λ Σ_{g ≠ f} E_{g | fg}(λ),   E_{g | fg} on fold g without folds f and g
+
+    With two folds, the halves of the other one take the place of the folds g.
+    """
     x = np.concatenate((np.ones((len(features), 1)), _unit(features), shared.y), 1)
     count = int(shared.folds.max()) + 1
-    sums = np.stack([_square(x[shared.folds == fold]) for fold in range(count)])
-    whole = sums.sum(0)
-    weights, mean = _ridge(whole - sums)
-    errors = _errors(sums, weights, mean)  # [F, L, 3]
-    judged = np.zeros_like(errors)
+    T_f = np.stack([_square(x[shared.folds == fold]) for fold in range(count)])
+    T = T_f.sum(0)
+    W, mean = _ridge(T - T_f)
+    E = _errors(T_f, W, mean)  # E_f(λ) [F, L, 3]
+    E_inner = np.zeros_like(E)  # Σ_g E_{g | fg}(λ)
     if count > 2:
-        pairs = np.array(list(combinations(range(count), 2)))
-        weights, mean = _ridge(whole - sums[pairs[:, 0]] - sums[pairs[:, 1]])
-        for out, inner in ((0, 1), (1, 0)):
-            np.add.at(judged, pairs[:, out], _errors(sums[pairs[:, inner]], weights, mean))
+        fg = np.array(list(combinations(range(count), 2)))  # each pair once: it serves both
+        W, mean = _ridge(T - T_f[fg[:, 0]] - T_f[fg[:, 1]])
+        for f, g in ((0, 1), (1, 0)):
+            np.add.at(E_inner, fg[:, f], _errors(T_f[fg[:, g]], W, mean))
     else:  # one fold to choose by: its own halves
         for fold in range(count):
             rows = x[shared.folds != fold]
             half = np.stack([_square(part) for part in np.array_split(rows, 2)])
-            judged[fold] = _errors(half, *_ridge(half[::-1])).sum(0)
-    best = judged.argmin(1)
-    return np.take_along_axis(errors, best[:, None], 1)[:, 0].sum(0)
+            E_inner[fold] = _errors(half, *_ridge(half[::-1])).sum(0)
+    best = E_inner.argmin(1)  # λ_f
+    return np.take_along_axis(E, best[:, None], 1)[:, 0].sum(0)
 
 
 def _square(rows: np.ndarray) -> np.ndarray:
+    """T = Σ_k t_k t_kᵀ [1 + P + 3, 1 + P + 3] of rows t = (1, x, y)."""
     return rows.T @ rows
 
 
 def _centred(sums: np.ndarray, mean: np.ndarray) -> np.ndarray:
-    """Sums of squares [..., P + 3, P + 3] about a mean that need not be their own."""
-    count, total = sums[..., :1, :1], sums[..., 0, 1:]
+    """Σ (t - m)(t - m)ᵀ = Σ t tᵀ - (Σ t) mᵀ - m (Σ t)ᵀ + n m mᵀ [..., P + 3, P + 3] of t = (x, y),
+    about a mean m that need not be their own."""
+    n, total = sums[..., :1, :1], sums[..., 0, 1:]
     cross = total[..., :, None] * mean[..., None, :]
-    about = count * mean[..., :, None] * mean[..., None, :]
+    about = n * mean[..., :, None] * mean[..., None, :]
     return sums[..., 1:, 1:] - cross - np.swapaxes(cross, -1, -2) + about
 
 
 def _ridge(sums: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Weights [T, L, P, 3] for each penalty, and the means [T, P + 3] they are about."""
-    count = sums[..., 0, 0]
-    mean = sums[..., 0, 1:] / count[..., None]
-    inner = _centred(sums, mean)
-    features, pull = inner[..., :-3, :-3], inner[..., :-3, -3:]
-    firm = PENALTIES[:, None, None] * count[:, None, None, None] * np.eye(features.shape[-1])
-    return np.linalg.solve(features[:, None] + firm, pull[:, None]), mean
+    """W(λ) = (X̃ᵀ X̃ + λ n I)⁻¹ X̃ᵀ ỹ [T, L, P, 3] for each penalty λ of PENALTIES, and the means
+    (x̄, ȳ) [T, P + 3] that it is about; T sums [1 + P + 3, 1 + P + 3] of (1, x, y).
+    Raises np.linalg.LinAlgError where a matrix is singular."""
+    n = sums[..., 0, 0]
+    mean = sums[..., 0, 1:] / n[..., None]
+    centred = _centred(sums, mean)
+    XtX, Xty = centred[..., :-3, :-3], centred[..., :-3, -3:]
+    penalty = PENALTIES[:, None, None] * n[:, None, None, None] * np.eye(XtX.shape[-1])
+    return np.linalg.solve(XtX[:, None] + penalty, Xty[:, None]), mean
 
 
 def _errors(sums: np.ndarray, weights: np.ndarray, mean: np.ndarray) -> np.ndarray:
-    """[T, L, 3] squared errors on other rows, of which `sums` are known."""
-    inner = _centred(sums, mean)
-    features, across = inner[:, None, :-3, :-3], inner[:, None, :-3, -3:]
-    own = np.diagonal(inner[..., -3:, -3:], axis1=-2, axis2=-1)
-    return (
-        own[:, None] - 2.0 * (weights * across).sum(-2) + (weights * (features @ weights)).sum(-2)
-    )
+    """E(λ) = ỹᵀ ỹ - 2 Wᵀ X̃ᵀ ỹ + Wᵀ X̃ᵀ X̃ W (its diagonal) [T, L, 3]: squared errors on other rows,
+    of which `sums` are known, about the means that W = `weights` [T, L, P, 3] are about."""
+    centred = _centred(sums, mean)
+    XtX, Xty = centred[:, None, :-3, :-3], centred[:, None, :-3, -3:]
+    yty = np.diagonal(centred[..., -3:, -3:], axis1=-2, axis2=-1)
+    return yty[:, None] - 2.0 * (weights * Xty).sum(-2) + (weights * (XtX @ weights)).sum(-2)

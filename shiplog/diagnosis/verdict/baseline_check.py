@@ -17,7 +17,8 @@ WORDS = ("surge", "sway", "yaw")
 
 
 def lacking(run: Run, store: Store, profile: Profile) -> str:
-    """Why the run's model cannot identify causes that change forces; empty where it can.
+    """Why the run's model cannot identify causes that change forces; empty where it can, that is
+    where Σ L_plain/Σ L_model ≥ BASELINE.
 
     Quadratic least squares is fitted to all stored nominal voyages but one in turn, and rolled out
     on that one. The physical model was fitted to all of them, so the comparison favours it. Windows

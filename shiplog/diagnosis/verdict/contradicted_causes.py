@@ -33,7 +33,7 @@ OF_COLUMNS = {"x0": "position", "y0": "position", "surge": "velocity", "sway": "
 COMPARED = "the rows that it would be fitted to contradict each other"
 
 
-def barred(channels: Iterable[str], profile: Profile) -> dict[str, str]:
+def barred_causes(channels: Iterable[str], profile: Profile) -> dict[str, str]:
     """Name of a cause → why it is not named: what it acts on is contradicted.
 
     channels   of findings: sensors, columns or actuators; what is none of these bars every cause
@@ -47,7 +47,7 @@ def barred(channels: Iterable[str], profile: Profile) -> dict[str, str]:
     return why
 
 
-def every(channels: Iterable[str], profile: Profile) -> dict[str, str]:
+def all_causes_barred(channels: Iterable[str], profile: Profile) -> dict[str, str]:
     """The same for all causes of the catalogue, where nothing can be compared."""
-    why = barred(channels, profile)
+    why = barred_causes(channels, profile)
     return {cause.name: why.get(cause.name, COMPARED) for cause in CATALOGUE}

@@ -1,4 +1,18 @@
-"""The verdict of a posterior, as the report and the refutation take it."""
+"""The verdict of a posterior, as the report and the refutation take it.
+
+Of P from `posterior`, names are stated where P(cause) ≥ STATED, and so is a kind of remainder. With
+h the likeliest hypothesis with these names, the first of these lines that holds is the verdict:
+
+    named      causes of h with stated names, of which the remainder could do no more than MOST, and
+               which explain MOST of what h does, unless its remainder is a device
+    unknown    the remainder of h is not nominal, and a kind or a name is stated; undecided where
+               causes explain more than it, it is a device with 0 < P < STATED, or held-out voyages
+               have refuted a cause
+    none       P(none)/(1 + Σ hidden) ≥ STATED
+    undecided  else
+
+A remainder that is a device with P ≥ STATED is named, too: the unrecorded thruster.
+"""
 
 from __future__ import annotations
 
@@ -46,34 +60,34 @@ def decide(
     refuted, table = dict(refuted or {}), search.table
     found = posteriors.posterior(search)
     names = () if doubted else found.stated
-    kind = found.remainder
-    best = posteriors.best_with(found, names, kind if not names else None)
+    stated_kind = found.remainder
+    best = posteriors.best_with(found, names, stated_kind if not names else None)
     fit = table.fit(best)
-    one_device, remains = posteriors.device(best), posteriors.practical_kind(table, best)
-    device = one_device >= thresholds.STATED  # then what remains has a name, too
+    p_device, kind = posteriors.device(best), posteriors.practical_kind(table, best)
+    is_device = p_device >= thresholds.STATED  # then what remains has a name, too
     in_doubt = _imitated(table, best, fit, names)
     sure = tuple(name for name in names if name not in in_doubt)
     kept = [n for n in best.causes if name_of(n) not in in_doubt]
-    mostly = device or posteriors.share_of_causes(table, best, kept) >= thresholds.MOST
+    explain_most = is_device or posteriors.share_of_causes(table, best, kept) >= thresholds.MOST
     verdict, structure, named, side_force = "undecided", None, (), None
     either: tuple[str, ...] = ()
     why = ""
-    if sure and mostly:
+    if sure and explain_most:
         verdict, named = "named", _named(table, found, best, sure)
-    elif remains != NOMINAL and (kind is not None or names):
+    elif kind != NOMINAL and (stated_kind is not None or names):
         structure = _structure(table, best, fit)
         probable = tuple(n for n in best.causes if name_of(n) in found.stated)
-        if one_device == 0.0 and posteriors.explain_more(table, best, probable):
+        if p_device == 0.0 and posteriors.explain_more(table, best, probable):
             either, why = tuple(dict.fromkeys(map(name_of, probable))), EXPLAIN_MORE
-        elif 0.0 < one_device < thresholds.STATED:
+        elif 0.0 < p_device < thresholds.STATED:
             why = PATTERN
-        elif refuted and not device:
+        elif refuted and not is_device:
             either, why = tuple(refuted), REFUTED
         else:
             verdict = "unknown"
     elif found.none_of_all >= thresholds.STATED:
         verdict = "none"
-    if verdict in ("named", "unknown") and device:
+    if verdict in ("named", "unknown") and is_device:
         verdict, structure, side_force = "named", None, best.side_force
     traces = ()
     if verdict == "none":
@@ -83,19 +97,21 @@ def decide(
     reported = fit if stands else table.fit(table.nothing)
     if side_force is not None:
         reported = _with_side_force(reported, side_force)
-    nothing = Fit(table.first, table.nothing.found, reported.remainder)
     return Decision(
-        verdict, named, structure, side_force, traces,
-        _reasons(search, found, refuted | dict(doubted or {}) | in_doubt, named),
-        found.ranking(either, why, one_device), reported, nothing, search.expected,
-        _in_addition(table, found, best, named), either, why,
+        verdict=verdict, named=named, structure=structure, side_force=side_force, traces=traces,
+        rejected=_reasons(search, found, refuted | dict(doubted or {}) | in_doubt, named),
+        ranking=found.ranking(either, why, p_device),
+        fit=reported, nothing=Fit(table.first, table.nothing.found, reported.remainder),
+        expected=search.expected, one_of=_in_addition(table, found, best, named),
+        either=either, why=why,
     ), found  # fmt: skip
 
 
 def _imitated(
     table: Hypotheses, best: Hypothesis, fit: Fit, names: Sequence[str]
 ) -> dict[str, str]:
-    """Names → why each is in doubt: the remainder could do most of what the cause does. An offset
+    """Names → why each is in doubt: the remainder could do more than MOST of what the cause does,
+    max over labels of `fits.imitated`. An offset
     of the rudder, for instance, may be a part of an unknown force of the controls. That puts no
     other cause in doubt, nor does a remainder that is slight next to what the cause explains."""
     shares: dict[str, float] = {}
@@ -124,7 +140,9 @@ def _size_without(table: Hypotheses, remainder: Remainder, name: str) -> float:
 def _named(
     table: Hypotheses, found: Posterior, best: Hypothesis, names: Sequence[str]
 ) -> tuple[Named, ...]:
-    """The causes of a hypothesis that have these names, with what else they may be."""
+    """The causes of a hypothesis that have these names, with what else they may be. Of numbers x
+    the covariance is V + diag((f x)²) + (u x)(u x)ᵀ: f the error of a cause's equations, u one
+    error that all its numbers share."""
     by, columns = table.by, table.trial.reference.columns
     given, at = [], 0
     for label in best.found.numbers:
@@ -134,13 +152,13 @@ def _named(
             continue
         assert best.found.covariance is not None
         numbers = np.asarray(best.found.numbers[label])
-        form = form_error_of(by[label]) * numbers  # its equations are no better than that
-        unit = by[label].unit_error * numbers  # one error of all numbers of the cause
+        fx = form_error_of(by[label]) * numbers  # its equations are no better than that
+        ux = by[label].unit_error * numbers  # one error of all numbers of the cause
         given.append(
             Named(
                 by[label], table.alone.get(label, float("nan")),
                 found.names.get(name_of(label), 0.0), numbers,
-                best.found.covariance[part, part] + np.diag(form**2) + np.outer(unit, unit),
+                best.found.covariance[part, part] + np.diag(fx**2) + np.outer(ux, ux),
                 _instead(found, best, label), table.trial.reference.freedom,
             )
         )  # fmt: skip
@@ -158,7 +176,8 @@ def _in_addition(
 
 
 def _instead(found: Posterior, best: Hypothesis, label: str) -> tuple[str, ...]:
-    """Labels of causes of another name that may stand in a cause's place."""
+    """Labels of causes of another name that may stand in a cause's place: of hypotheses with that
+    one instead and score_best - score < INSTEAD_NATS."""
     rest = set(best.causes) - {label}
     others: dict[str, None] = {}
     for one in found.hypotheses:
@@ -172,6 +191,7 @@ def _instead(found: Posterior, best: Hypothesis, label: str) -> tuple[str, ...]:
 
 
 def _structure(table: Hypotheses, best: Hypothesis, fit: Fit) -> Structure:
+    """The family of what remains, log Z_best - log Z_nothing, and the channels that it acts on."""
     gained = best.evidence - table.nothing.evidence
     family = FAMILY.get(best.kind, best.kind)
     if family in (STOCHASTIC, INTERMITTENT):

@@ -1,4 +1,10 @@
-"""The gain of causes on held-out windows: numbers fitted without the windows' voyage."""
+"""The gain of causes on held-out windows: numbers fitted without the windows' voyage.
+
+    L_w = Σ_channels L_wc of each window w,   gain = 1 - Σ_w L_w(after)/Σ_w L_w(before)
+
+with `after` rolled out by numbers that were fitted without the voyage of w, or without its half of
+the only voyage.
+"""
 
 from __future__ import annotations
 
@@ -99,6 +105,7 @@ class HeldOut(Rollouts):
         return states
 
     def gain(self, decision: Decision) -> Gain:
+        """1 - Σ L_after/Σ L_before of what is named over nothing, with its interval."""
         return self.gain_between(self.losses_before, self.parts(self.states_after(decision)))
 
     def changes_velocity(self, decision: Decision, one: Named) -> bool:
@@ -188,7 +195,7 @@ class HeldOut(Rollouts):
     @cached_property
     def _other(self) -> sign_conventions.Tried:
         counted = self.cut.pick(np.flatnonzero(self.counted))
-        return sign_conventions.tried(self.before, counted, self.nominal, self.read_as)
+        return sign_conventions.try_conventions(self.before, counted, self.nominal, self.read_as)
 
     @cached_property
     def _level(self) -> float | None:

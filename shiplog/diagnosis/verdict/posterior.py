@@ -3,6 +3,9 @@
 P(cause) is the sum over all hypotheses that contain it, each times the probability that its numbers
 are then of practical size. A cause is named where that is at least `thresholds.STATED`; otherwise a
 kind of remainder is, or nothing, or the verdict is undecided.
+
+    p_h = exp(score_h)/Σ exp(score),   P(cause) = Σ_h p_h P_h(cause is practical)
+    P(kind) = Σ_{h of that kind} p_h,  P(none) = Σ_{h nominal} p_h Π_causes (1 - P_h(practical))
 """
 
 from __future__ import annotations
@@ -63,8 +66,8 @@ class Posterior:
 
     @property
     def none_of_all(self) -> float:
-        """Probability that nothing changed, as the ranking has it: causes that these data would
-        hardly show keep what they had before any data."""
+        """P(none)/(1 + Σ hidden): probability that nothing changed, as the ranking has it: causes
+        that these data would hardly show keep what they had before any data."""
         return self.none / (1.0 + sum(self.hidden.values()))
 
     @property
@@ -76,8 +79,9 @@ class Posterior:
     def ranking(
         self, either: Collection[str] = (), why: str = "", device: float = 0.0
     ) -> dict[str, float]:
-        """Every answer with its probability, likeliest first. Causes that these data would hardly
-        show were not weighed one by one: of "none" they keep what they had before any data.
+        """Every answer with its probability over 1 + Σ hidden, likeliest first. Causes that these
+        data would hardly show were not weighed one by one: of "none" they keep what they had before
+        any data.
 
         either   names of causes that act, or else the remainder does: each has half
         why      REFUTED: held-out voyages refute `either`; all that is left without has half
@@ -101,7 +105,9 @@ class Posterior:
 
 
 def posterior(search: Search) -> Posterior:
-    """Of the weighed hypotheses, without those that are banned."""
+    """p_h = exp(score_h - max)/Σ exp(score - max) of the weighed hypotheses, without those that are
+    banned; P of names, kinds and none, as the module's equations; and of causes that were only
+    scanned, hidden = Σ exp(score - max)/Σ_weighed exp(score - max)."""
     kept = search.table.ranked()
     score = np.array([h.score for h in kept])
     share = np.exp(score - score.max())
@@ -141,7 +147,8 @@ def posterior(search: Search) -> Posterior:
 def _one_of(
     names: Mapping[str, float], large_in: Sequence[Mapping[str, float]], share: np.ndarray
 ) -> tuple[str, ...]:
-    """The fewest of the likeliest unstated names of which one acts with the stated probability."""
+    """The fewest of the likeliest unstated names with 1 - Σ_h p_h Π_names (1 - P_h(practical)) of
+    STATED at least: one of them acts with the stated probability."""
     group: list[str] = []
     for name in (n for n, p in names.items() if p < thresholds.STATED):
         group.append(name)
@@ -152,7 +159,8 @@ def _one_of(
 
 
 def practical(table: Hypotheses, one: Hypothesis) -> dict[str, float]:
-    """Label → probability, given this hypothesis, that its numbers are large enough to matter."""
+    """Label → P_h(practical): the share of DRAWS of x ~ N(x̂, V), its numbers in this hypothesis
+    [SI], that are large enough to matter."""
     reference, covariance = table.trial.reference, one.found.covariance
     found, at = {}, 0
     for label, numbers in one.found.numbers.items():
@@ -168,8 +176,8 @@ def practical(table: Hypotheses, one: Hypothesis) -> dict[str, float]:
 
 
 def _deviations(covariance: np.ndarray) -> np.ndarray:
-    """As `deviations`; none where a fit far behind has no covariance any more. Gaussian, as the
-    evidence is."""
+    """V^½ t [DRAWS, n], as `deviations`; none where a fit far behind has no covariance any more.
+    Gaussian, as the evidence is."""
     try:
         return deviations(covariance, math.inf, DRAWS)
     except np.linalg.LinAlgError:
@@ -196,10 +204,10 @@ def device(one: Hypothesis) -> float:
 
 
 def share_of_causes(table: Hypotheses, one: Hypothesis, causes: Sequence[str]) -> float:
-    """Of what a hypothesis explains beyond nothing, the share that these of its causes explain:
-    over nothing with nominal, or with raised process noise. What raised noise explains no cause
-    does, nor what a force explains that counts as such. Nothing, where these causes alone were not
-    weighed."""
+    """max over kinds of (log Z_causes - log Z_nothing)/(log Z_h - log Z_nothing): of what a
+    hypothesis h explains beyond nothing, the share that these of its causes explain, over nothing
+    with nominal, or with raised process noise. What raised noise explains no cause does, nor what a
+    force explains that counts as such. Nothing, where these causes alone were not weighed."""
     shares, kinds = [], {NOMINAL, RAISED}
     if practical_kind(table, one) == NOMINAL:
         kinds.add(one.kind)
@@ -212,9 +220,10 @@ def share_of_causes(table: Hypotheses, one: Hypothesis, causes: Sequence[str]) -
 
 
 def slight(table: Hypotheses, one: Hypothesis, cause: str = "") -> bool:
-    """Whether the remainder of a hypothesis adds so little to its causes with nominal process noise
-    that it can be an error of their equations: little of what they explain, or, where that is
-    named, of what one of its causes explains next to the others."""
+    """Whether log Z_h - log Z_plain ≤ SLIGHT (log Z_h - log Z_less): the remainder of a hypothesis
+    adds so little to its causes with nominal process noise (plain) that it can be an error of their
+    equations: little of what they explain beyond nothing (less), or, where that is named, of what
+    one of its causes explains next to the others."""
     plain = table.found.get((one.causes, NOMINAL))
     rest = tuple(n for n in one.causes if name_of(n) != cause) if cause else ()
     less = table.found.get((rest, NOMINAL), table.nothing)
@@ -225,9 +234,9 @@ def slight(table: Hypotheses, one: Hypothesis, cause: str = "") -> bool:
 
 
 def explain_more(table: Hypotheses, one: Hypothesis, causes: Sequence[str]) -> bool:
-    """Whether these causes by themselves explain more than the remainder of a hypothesis does by
-    itself. What is left next to them may then be an error of their equations. Not where one of
-    both was never weighed."""
+    """Whether log Z_causes > log Z_remainder: these causes by themselves explain more than the
+    remainder of a hypothesis does by itself. The rest may then be an error of their equations. Not
+    where one of both was never weighed."""
     alone = table.found.get((tuple(causes), NOMINAL))
     remainder = table.found.get(((), one.kind))
     if not causes or alone is None or remainder is None:

@@ -144,7 +144,7 @@ def judged(
         worths = [gain]
         if len(decision.named) > 1:
             reduced = [
-                decisions.without(search.table.trial, decision, one) for one in decision.named
+                decisions.without_cause(search.table.trial, decision, one) for one in decision.named
             ]
             worths = [held.worth(rest, decision) for rest in reduced]
         asked = list(zip(decision.named, worths, strict=True))

@@ -95,7 +95,7 @@ class Decision:
         return replace(self, named=(), one_of=(), fit=replace(self.nothing, found=nothing))
 
 
-def without(trial: Trial, decision: Decision, one: Named) -> Decision:
+def without_cause(trial: Trial, decision: Decision, one: Named) -> Decision:
     """The same verdict with one cause less, the others fitted again."""
     named = tuple(n for n in decision.named if n is not one)
     fit, remainder = decision.fit, decision.fit.remainder
@@ -129,7 +129,7 @@ def _fitted_again(found: Found, named: Sequence[Named]) -> tuple[Named, ...]:
     return tuple(again)
 
 
-def untold(decision: Decision) -> Decision:
+def without_simulation(decision: Decision) -> Decision:
     """Of a model that simulates nothing: its error goes with the motion, and has no name."""
     return replace(
         decision, verdict="unknown", named=(), side_force=None, traces=(),

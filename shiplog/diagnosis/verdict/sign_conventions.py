@@ -84,17 +84,19 @@ class Tried:
 
 
 def best(simulator: ExtendedSimulator, cut: Windows) -> tuple[str, float]:
-    """The change of convention with the smallest mean L on these windows, in words, and that L. A
-    window in which the model diverges has an L of RUNAWAY."""
-    found = tried(simulator, cut)
+    """argmin over conventions of mean L on these windows, in words, and that L. A window in which
+    the model diverges has an L of RUNAWAY."""
+    found = try_conventions(simulator, cut)
     return found.words, found.loss
 
 
-def tried(
+def try_conventions(
     simulator: ExtendedSimulator, cut: Windows, nominal: Windows | None = None,
     read_as: Profile | None = None,
 ) -> Tried:  # fmt: skip
-    """As `best`. Where nominal windows are given, conventions that these show as well are left
+    """As `best`: argmin of h L max(L_hold/L_hold', 1), with L_hold of constant velocities as the
+    windows are and L_hold' under the convention, and a handicap h (NEARLY, UNSTATED, else 1).
+    Where nominal windows are given, conventions that these show as well (L'/L ≤ THERE_TOO) are left
     out: their model has them, too.
 
     read_as   the profile through which the windows were read; None where it is not known
@@ -122,6 +124,7 @@ def tried(
 
 
 def _mean(simulator: ExtendedSimulator, cut: Windows) -> float:
+    """mean_w min(L_w, RUNAWAY)."""
     each = np.nan_to_num(simulator.losses(cut), nan=RUNAWAY, posinf=RUNAWAY)
     return float(np.minimum(each, RUNAWAY).mean())
 
@@ -131,7 +134,7 @@ def _hold(cut: Windows) -> float:
     return float(parts(cut.state[:, :1] - cut.state, cut.dt).sum(1).mean()) if len(cut) else 0.0
 
 
-def other(profile: Profile, cut: Windows) -> Iterator[tuple[str, Windows]]:
+def windows_under_conventions(profile: Profile, cut: Windows) -> Iterator[tuple[str, Windows]]:
     """Each convention in words, and the windows under it."""
     for one in conventions(profile, cut):
         yield one.words, one.windows
@@ -139,7 +142,7 @@ def other(profile: Profile, cut: Windows) -> Iterator[tuple[str, Windows]]:
 
 def conventions(profile: Profile, cut: Windows, read_as: Profile | None = None) -> Iterator[Turned]:
     """Signs of actuators of a kind, twins exchanged, their units; the wind's direction and unit;
-    heading, yaw rate and velocity. read_as   as `tried` has it"""
+    heading, yaw rate and velocity. read_as   as `try_conventions` has it"""
     yield from _of_actuators(profile, cut, read_as)
     if cut.wind.shape[-1]:
         yield from _of_wind(cut, read_as)
@@ -188,6 +191,7 @@ def _of_actuators(profile: Profile, cut: Windows, read_as: Profile | None) -> It
 
 
 def _of_wind(cut: Windows, read_as: Profile | None) -> Iterator[Turned]:
+    """γ + π, -γ, γ ± π/2, γ - ψ of the wind's angle γ; its speed over each factor of SPEEDS."""
     key = "[sensors.wind]"
     yield Turned(
         "the wind direction as the one that it blows towards",
@@ -216,6 +220,8 @@ def _of_wind(cut: Windows, read_as: Profile | None) -> Iterator[Turned]:
 
 
 def _of_motion(profile: Profile, cut: Windows, read_as: Profile | None) -> Iterator[Turned]:
+    """-ψ, π/2 - ψ, ψ + π/2, ψ + π of the heading ψ, and ψ over each factor of ANGLES; -r and r over
+    each of RATES; then `_of_velocity`."""
     record = as_record(cut, profile, {}, {})
     seen = record.sighted
 
@@ -275,6 +281,8 @@ def _of_velocity(
     over_ground: bool,
     read_as: Profile | None,
 ) -> Iterator[Turned]:
+    """V over each factor of SPEEDS, and its parts turned round or exchanged: (V₁, -V₂), (V₂, V₁),
+    -V; or the velocity of the positions."""
     key = "[sensors.velocity]"
     velocity = seen.velocity
     for factor, words in SPEEDS.items():
@@ -312,7 +320,7 @@ def _of_velocity(
 
 
 def _moving(seen: Sighted, cut: Windows) -> np.ndarray:
-    """[n, 2] velocity of the positions over ground, by differences."""
+    """(p_{k+1} - p_{k-1})/(t_{k+1} - t_{k-1}) [n, 2] m/s: velocity of the positions over ground."""
     position = seen.position.reshape(*cut.state.shape[:2], 2)
     since = np.pad(np.cumsum(cut.dt, axis=1), ((0, 0), (1, 0)))[..., None]
     rate = np.empty(position.shape)
@@ -322,8 +330,8 @@ def _moving(seen: Sighted, cut: Windows) -> np.ndarray:
 
 
 def _aligned(heading: np.ndarray, seen: Sighted, cut: Windows, over_ground: bool) -> np.ndarray:
-    """A heading [n] whose zero is lost, turned in each window so that the ship goes ahead in the
-    mean: as the velocity over ground goes."""
+    """ψ + arg Σ (V_N + i V_E) exp(-iψ) [n] rad: a heading whose zero is lost, turned in each window
+    so that the ship goes ahead in the mean, as the velocity V over ground goes."""
     if not over_ground:
         return heading
     count, size, _ = cut.state.shape
@@ -333,13 +341,13 @@ def _aligned(heading: np.ndarray, seen: Sighted, cut: Windows, over_ground: bool
     return (each + np.angle(along.sum(1))[:, None]).reshape(-1)
 
 
-def at_once(
+def sufficient_convention(
     simulator: ExtendedSimulator, cut: Windows, nominal: Windows, read_as: Profile | None = None
 ) -> str:
     """What a convention explains so well that no search for causes is needed: it leaves next to
     nothing of what the trial has more than the nominal voyages. Empty where none does."""
     own, level = _mean(simulator, cut), _mean(simulator, nominal)
-    found = tried(simulator, cut, nominal, read_as)
+    found = try_conventions(simulator, cut, nominal, read_as)
     if own - found.loss < thresholds.ALL_EXCESS * (own - level):
         return ""
     return sentence(found, own) if explains(found, own, own, _hold(cut), level) else ""
@@ -353,9 +361,10 @@ def sentence(found: Tried, own: float) -> str:
 
 
 def explains(found: Tried, own: float, after: float, hold: float, level: float | None) -> bool:
-    """Whether a convention is the explanation: it leaves less than half of the model's error, and
-    less than constant velocities have; it takes away most of what the trial has more than the
-    nominal voyages; and no causes leave less.
+    """Whether a convention, of mean L', is the explanation: it leaves less than half of the model's
+    error, and less than constant velocities have, L' < min(TURNED_SIGN own, hold); and less than
+    TURNED_SIGN `after`, or else it takes away most of what the trial has more than the nominal
+    voyages, own - L' ≥ MOST_OF_EXCESS (own - level), and no causes leave less, L' ≤ after.
 
     own, after  mean L as log and profile have it, without and with the named causes
     hold        of constant velocities

@@ -55,7 +55,7 @@ class Decided:
     refuted: Mapping[str, str]
 
 
-def decided(
+def decide_trial(
     run: Run, nominal: Record | None, recorded: Record, cut: Windows | None,
     causes: Sequence[Cause], lacking: str, reach: Callable[[str], None] = lambda stage: None,
     barred: Mapping[str, str] | None = None, before: Windows | None = None,

@@ -287,7 +287,7 @@ def contradicted(
         f"{contradictions.text(found)} No verdict: no cause is tested against such rows. Correct "
         "the profile, ingest these logs again, and diagnose again."
     )
-    why = contradicted_causes.every(contradictions.channels(found), run.profile)
+    why = contradicted_causes.all_causes_barred(contradictions.channels(found), run.profile)
     return Verdict(
         "undecided", sentence, run.name, before_effect, made_of(run, recorded),
         unavailable=verdicts.rejected_json(why),
@@ -302,7 +302,7 @@ def other_convention(
     """The verdict where the profile reads these logs otherwise than those of the model: all that
     the trial has more than the nominal voyages goes with one sign, place or unit.
 
-    why   as `sign_conventions.at_once` has it
+    why   as `sign_conventions.sufficient_convention` has it
     """
     said = f"{contradictions.text(found)} {none_named(why)}.".strip()
     structure = {"family": "motion", "acts_on": [], "depends_on": list(verdicts.DEPENDS["motion"]),

@@ -11,7 +11,7 @@ from shiplog.diagnosis.hypotheses import intermittent
 from shiplog.diagnosis.linear import linearisation, segment_nodes
 from shiplog.diagnosis.linear.measurement_correction import corrected
 from shiplog.diagnosis.noise import residual_acceleration
-from shiplog.diagnosis.noise.residual_acceleration import around
+from shiplog.diagnosis.noise.residual_acceleration import means_about
 from shiplog.diagnosis.residual import external_forces
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.diagnosis.verdict.result import SIDE_THRUST, Decision
@@ -76,7 +76,7 @@ def _residual(done: DiagnosedTrial) -> tuple[pl.DataFrame, tuple[str, ...]]:
     process_noise = trial.process_noise(nothing.remainder, whole.cut)
     process_noise = process_noise.times(nothing.found.noise_factor)
     found = residual_acceleration.posterior(*trial.left(whole, nominal), process_noise, record)
-    keep = residual_acceleration.once(found)
+    keep = residual_acceleration.unique_instants(found)
     order = np.argsort(found.rows[keep])
     rows = found.rows[keep][order]
     mean, sd = (np.moveaxis(v, 1, -1)[keep][order] for v in (found.mean, found.sd))
@@ -114,7 +114,9 @@ def _caused(trial: Trial, decision: Decision, rows: np.ndarray) -> np.ndarray:
         theta[ref.columns.base :] += ref.columns.numbers(numbers)
         was = corrected(ref.model.causes, trial.record, numbers)
         driven = np.concatenate((was.actuator, was.share[:, None]), 1)
-        state, driven, wind = (around(was, v, rows) for v in (was.state, driven, was.true_wind))
+        state, driven, wind = (
+            means_about(was, v, rows) for v in (was.state, driven, was.true_wind)
+        )
         # by as many as a segment has knots: that shape is compiled already
         blocks = -(-len(rows) // trial.grid.knots)
         state, driven = (

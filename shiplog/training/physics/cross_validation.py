@@ -1,4 +1,7 @@
-"""Errors on voyages that the fit has not used: only a gain on these counts."""
+"""Errors on voyages that the fit has not used: only a gain on these counts.
+
+L_w = L_w(θ̂_{-k}),   k the fold of window w's voyage, θ̂_{-k} fitted with ω_w = 0 in fold k
+"""
 
 from __future__ import annotations
 
@@ -51,7 +54,8 @@ def cross_validate(
     groups: Sequence[str],
     count: int = FOLDS,
 ) -> CrossValidated | None:
-    """Fit without each fold and roll it out there; None where there is nothing to hold out.
+    """L_w(θ̂_{-k}) of each window w in fold k: fit without each fold and roll it out there; None
+    where there is nothing to hold out.
 
     fit   gets `data` with the weights of the held-out windows at zero
     """
@@ -90,8 +94,12 @@ def as_good(judged: dict[float, np.ndarray]) -> list[float]:
 
     judged   setting → L of each held-out window [N], infinite where it diverged
 
-    One standard error (Breiman et al. 1984) of paired windows. A setting with which more windows
-    diverge is not chosen; windows that diverge with every setting are left out.
+    One standard error (Breiman et al. 1984) of paired windows: with d_w = L_w - L_w(best),
+
+        mean(d) ≤ sd(d)/√N
+
+    A setting with which more windows diverge is not chosen; windows that diverge with every setting
+    are left out.
     """
     lost = {one: int((~np.isfinite(loss)).sum()) for one, loss in judged.items()}
     able = [one for one in judged if lost[one] == min(lost.values())]

@@ -1,4 +1,9 @@
-"""The hybrid's residual network: scaled on the training windows, fitted by the same rollouts."""
+"""The hybrid's residual network: scaled on the training windows, fitted by the same rollouts.
+
+    (u̇, v̇, ṙ) = f(x, u; θ̂) + n(x, u; W),   W = argmin Σ_w ω_w L_w(W)/σ² + Σ_i (W_i - W₀_i)²/s_i²
+
+with the physics' θ̂ held, s_i the spread of a weight by `strength` (`hybrid.weight_spread`).
+"""
 
 from __future__ import annotations
 
@@ -19,7 +24,9 @@ EVALUATIONS = 25  # a network's last per cent does not survive held-out voyages
 
 
 def residual(physics: MMG, data: WindowSeries, width: int) -> Residual:
-    """What is fixed of the network, from the windows with weight alone."""
+    """What is fixed of the network, from the windows with weight alone: mean and standard deviation
+    of its inputs (u, v, r, actuators, U_A cos γ_A, U_A sin γ_A), its bound, the standard deviation
+    of (ν(t + h) - ν(t))/h with h = STRETCH, and where it falls silent."""
     chosen = data.weight > 0
     state, actuator, wind = data.measured[chosen], data.actuator[chosen], data.wind[chosen]
     parts = [state[..., list(VELOCITY_IN_STATE)], actuator]
@@ -83,7 +90,7 @@ def fit(
 
 
 def choose(judged: dict[float, np.ndarray]) -> float:
-    """The least strength that is not worse than the best by more than chance.
+    """min of the strengths that are not worse than the best by more than chance (`as_good`).
 
     judged   strength → L of each held-out window [N]; strength 0 is the physics alone, and the
              answer where fewer than two windows can be judged

@@ -1,4 +1,8 @@
-"""Parameters that the data could not separate, as sentences of the report."""
+"""Parameters that the data could not separate, as sentences of the report.
+
+Of the estimate's covariance C and the plausible spreads s: a parameter is undetermined where
+C_ii^½ > SILENT s_i, and two are not separated where |C_ij|/(C_ii C_jj)^½ > TRADING.
+"""
 
 from __future__ import annotations
 
@@ -23,27 +27,28 @@ QUESTIONS = {  # part of the model → what else may be wrong
 }
 
 
-def silent(found: Identified, spread: np.ndarray) -> np.ndarray:
-    """Mask [P] of free parameters that stand where the ridge holds them."""
+def undetermined(found: Identified, spread: np.ndarray) -> np.ndarray:
+    """C_ii^½ > SILENT s_i [P]: mask of free parameters that stand where the ridge holds them."""
     return found.free & (found.standard_error > SILENT * spread)
 
 
 def correlations(found: Identified) -> np.ndarray:
-    """[P, P], zero where a parameter was held."""
+    """C_ij/(C_ii C_jj)^½ [P, P], zero where a parameter was held."""
     error = found.standard_error
     scale = np.where(error > 0, error, 1.0)
     return found.covariance / np.outer(scale, scale) * (np.outer(error, error) > 0)
 
 
-def trades(found: Identified) -> list[tuple[int, int, float]]:
-    """Pairs of parameters that only show together, strongest first."""
+def correlated_pairs(found: Identified) -> list[tuple[int, int, float]]:
+    """Pairs i < j with |correlation| > TRADING, strongest first: parameters that only show
+    together."""
     matrix = np.triu(correlations(found), 1)
     rows, columns = np.nonzero(np.abs(matrix) > TRADING)
     pairs = [(int(i), int(j), float(matrix[i, j])) for i, j in zip(rows, columns, strict=True)]
     return sorted(pairs, key=lambda pair: -abs(pair[2]))
 
 
-def note(
+def describe(
     found: Identified,
     names: Sequence[str],
     spread: np.ndarray,
@@ -52,15 +57,15 @@ def note(
 ) -> list[str]:
     """Sentences for a report: correlated, undetermined and limited parameters."""
     sentences = []
-    for i, j, value in trades(found)[:MOST_PAIRS]:
+    for i, j, value in correlated_pairs(found)[:MOST_PAIRS]:
         sentences.append(
             f"{meaning(names[i])} ({names[i]}) and {meaning(names[j])} ({names[j]}) trade against "
             f"each other here: correlation {value:+.2f}."
         )
-    more = len(trades(found)) - MOST_PAIRS
+    more = len(correlated_pairs(found)) - MOST_PAIRS
     if more > 0:
         sentences.append(f"{more} more pairs correlate above {TRADING}.")
-    quiet = [names[int(i)] for i in np.flatnonzero(silent(found, spread))]
+    quiet = [names[int(i)] for i in np.flatnonzero(undetermined(found, spread))]
     if quiet:
         sentences.append(
             f"These data say nothing about {', '.join(quiet)}: they stand where they started."

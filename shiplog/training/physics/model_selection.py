@@ -66,7 +66,8 @@ def choose_ridge(ready: Prepared, settings: Physics) -> tuple[Chosen, Identified
 
 
 def _worth(loss: np.ndarray) -> tuple[int, float]:
-    """What is less is better: windows [N] that diverge, and then L of the others."""
+    """(n diverged, mean L of the others): what is less is better, first by the windows [N] that
+    diverge."""
     ends = np.isfinite(loss)
     return int((~ends).sum()), float(loss[ends].mean()) if ends.any() else 0.0
 

@@ -3,7 +3,11 @@
 Gauss-Newton in a trust region (scipy's `least_squares`, within physical bounds), with a ridge that
 holds each parameter to its starting value in units of its plausible spread: what the data say
 nothing about stays where it was. Standard errors are those of correlated errors: a rollout's
-error at one second is its error a second later.
+error at one second is its error a second later. In units x = (θ - θ₀)/(φ s),
+
+    x̂ = argmin Σ_w ω_w L_w(θ)/σ² + |x|²
+
+Symbols as in the room's opening.
 """
 
 from __future__ import annotations
@@ -48,6 +52,7 @@ class Identified:
 
     @property
     def standard_error(self) -> np.ndarray:
+        """(cov θ̂)ᵢᵢ^½ [P]; zero for those that were held."""
         return np.sqrt(np.diag(self.covariance))
 
 
@@ -64,31 +69,31 @@ def identify(
     most: int = MOST_EVALUATIONS,
     rounds: int = REWEIGHTINGS,
 ) -> Identified:
-    """Fit θ by rollout error over all windows with weight.
+    """θ̂ = argmin Σ_w ω_w L_w(θ)/σ² + |(θ - θ₀)/(φ s)|², σ² in each round of the fit before it.
 
-    start, spread   [P]  where the ridge holds each parameter, and how firmly
-    bounds          [P], [P]  physical range
+    start, spread   θ₀, s [P]  where the ridge holds each parameter, and how firmly
+    bounds          low, high [P]  physical range
     free            [P]  which may move; all
     begin           [P]  where to begin, if not at `start`
-    factor          on the spreads in the ridge: 2 holds a quarter as firmly; what is plausible,
+    factor          φ, on the spreads in the ridge: 2 holds a quarter as firmly; what is plausible,
                     and so what an untouched parameter's standard error is, stays `spread`
     most, rounds    evaluations a round; rounds of weighing the ridge by the noise left over
 
     Raises ModelError where the windows diverge from the start, and from the fit of shorter ones.
     """
     free = (np.ones(len(start), dtype=bool) if free is None else free) & (spread > 0.0)
-    held = factor * spread
+    width = factor * spread  # φ s
     values = np.array(start if begin is None else begin, dtype=float)
     endless = np.full(len(start), np.inf)
     low, high = bounds if bounds is not None else (-endless, endless)
     weight = data.weight
     before = _used(losses(model, np.array(start, dtype=float), data), weight)
     if not np.isfinite(_used(losses(model, values, data), weight)).all():
-        values = _from_short_windows(model, start, held, data, (low, high), free, values)
+        values = _from_short_windows(model, start, width, data, (low, high), free, values)
     noise = _noise(_used(losses(model, values, data), weight), data)
     evaluations, converged, message = 0, True, "converged"
     for _ in range(rounds):
-        problem = _Problem(model, start, held, data, free, noise)
+        problem = _Problem(model, start, width, data, free, noise)
         done = problem.solved(values, (low, high), most)
         evaluations += problem.evaluations
         values = problem.whole(done.x)
@@ -114,7 +119,8 @@ def identify(
 
 
 def _noise(loss: np.ndarray, data: WindowSeries) -> float:
-    """Weighted variance of one independent observation of the error, of L of each window [N]."""
+    """σ² = t_c Σ_w ω_w L_w/(3 Σ_w ω_w T_w), LEAST_VARIANCE at least: weighted variance of one
+    independent observation of the error, of L of each window [N] and their lengths T_w [s]."""
     samples = 3.0 * float((data.weight * data.dt.sum(1)).sum())
     return max(CORRELATION * float(data.weight @ loss) / samples, LEAST_VARIANCE)
 
@@ -156,7 +162,8 @@ def _from_short_windows(
 
 
 def _unsettled(done, names: Sequence[str], free: np.ndarray, most: int) -> str:
-    """Which parameters the cost still falls along, where the evaluations ran out."""
+    """Which parameters the cost still falls along, the largest |Jᵀ r|, where the evaluations ran
+    out."""
     slope = np.abs(done.jac.T @ done.fun)
     moving = [int(np.flatnonzero(free)[i]) for i in np.argsort(-slope)[:3]]
     return (
@@ -168,8 +175,14 @@ def _unsettled(done, names: Sequence[str], free: np.ndarray, most: int) -> str:
 class _Problem:
     """The sum of squares for scipy, in as few rows as there are parameters.
 
-    JᵀJ, Jᵀr and rᵀr say all that a Gauss-Newton step needs to know; a triangular root of them
-    stands in for the J and r of ten thousands of rows, which never exist as a whole.
+    JᵀJ, Jᵀr and rᵀr say all that a Gauss-Newton step needs to know; a root of them stands in for
+    the J and r of ten thousands of rows, which never exist as a whole. In units x, with
+    H = Σ_w ω_w Σ_t J_wᵀ W² J_w Δt/σ² = V diag(λ) Vᵀ, q = Σ_w ω_w Σ_t J_wᵀ W² r_t Δt/σ² and
+    c = Σ_w ω_w L_w/σ²,
+
+        J = (diag(λ^½) Vᵀ; I; 0),   p = diag(λ^-½) Vᵀ q,   r = (p; x; (c - |p|²)^½)
+
+    have JᵀJ = H + I, Jᵀr = q + x and rᵀr = c + |x|². spread is φ s, the width of the ridge.
     """
 
     def __init__(self, model, start, spread, data, free, noise) -> None:
@@ -179,7 +192,8 @@ class _Problem:
         self._at: np.ndarray | None = None
 
     def solved(self, values: np.ndarray, bounds: tuple[np.ndarray, np.ndarray], most: int):
-        """Scipy's solution from `values` [P] on, within bounds, in at most `most` evaluations."""
+        """x̂ = argmin c(x) + |x|²: scipy's solution from θ = `values` [P] on, within bounds, in at
+        most `most` evaluations."""
         free, scale = self.free, self.spread[self.free]
         guess = (values - self.start)[free] / scale
         low, high = ((b - self.start)[free] / scale for b in bounds)
@@ -196,41 +210,45 @@ class _Problem:
         )
 
     def whole(self, x: np.ndarray) -> np.ndarray:
+        """θ = θ₀ + φ s x [P], of the free x."""
         values = self.start.copy()
         values[self.free] += x * self.spread[self.free]
         return values
 
     def _evaluate(self, x: np.ndarray) -> None:
+        """r(x) and J(x), by one pass over all windows; not a number where the cost is none."""
         if self._at is not None and np.array_equal(self._at, x):
             return
         self.evaluations += 1
         self._at = x.copy()
         found = normal(self.model, self.whole(x), self.data, _indices(self.free))
         scale = self.spread[self.free]
-        gram = found.gram * np.outer(scale, scale) / self.noise
+        H = found.gram * np.outer(scale, scale) / self.noise
         weight = self.data.weight
-        pull = (weight @ _used(found.pull, weight)) * scale / self.noise
-        cost = float(weight @ _used(found.loss, weight)) / self.noise
+        q = (weight @ _used(found.pull, weight)) * scale / self.noise
+        c = float(weight @ _used(found.loss, weight)) / self.noise
         count = len(x)
-        if not (np.isfinite(cost) and np.isfinite(gram).all()):
+        if not (np.isfinite(c) and np.isfinite(H).all()):
             self._residual = np.full(2 * count + 1, np.nan)
             self._jacobian = np.zeros((2 * count + 1, count))
             return
         # Eigenvalues rather than Cholesky: parameters that the data do not touch make it singular.
-        values, vectors = np.linalg.eigh(gram)
-        keep = values > 1e-14 * max(values[-1], 1e-300)
-        root = np.where(keep, np.sqrt(np.maximum(values, 0.0)), 0.0)
+        eigenvalues, V = np.linalg.eigh(H)
+        keep = eigenvalues > 1e-14 * max(eigenvalues[-1], 1e-300)
+        root = np.where(keep, np.sqrt(np.maximum(eigenvalues, 0.0)), 0.0)
         inverse = np.where(keep, 1.0 / np.where(keep, root, 1.0), 0.0)
-        projected = inverse * (vectors.T @ pull)
-        rest = np.sqrt(max(cost - float(projected @ projected), 0.0))
-        self._jacobian = np.vstack((root[:, None] * vectors.T, np.eye(count), np.zeros(count)))
-        self._residual = np.concatenate((projected, x, [rest]))
+        p = inverse * (V.T @ q)
+        rest = np.sqrt(max(c - float(p @ p), 0.0))
+        self._jacobian = np.vstack((root[:, None] * V.T, np.eye(count), np.zeros(count)))
+        self._residual = np.concatenate((p, x, [rest]))
 
     def residual(self, x: np.ndarray) -> np.ndarray:
+        """r(x) [2P + 1], rᵀr = c(x) + |x|²."""
         self._evaluate(x)
         return self._residual
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
+        """J(x) [2P + 1, P], JᵀJ = H + I."""
         self._evaluate(x)
         return self._jacobian
 
@@ -253,24 +271,29 @@ def covariance(
     noise: float,
     factor: float = 1.0,
 ) -> np.ndarray:
-    """[P, P] of the estimate: the ridge's and the data's information, with each window one
-    observation of its own gradient (the sandwich of Huber 1967 and White 1980, shrunk).
+    """cov θ̂ [P, P]: the ridge's and the data's information, with each window one observation of its
+    own gradient (the sandwich of Huber 1967 and White 1980, shrunk). In units s, with H and F as in
+    the room's opening, g_w = Σ_t J_wᵀ W² r_t Δt/σ² and n = Σ_w ω_w:
 
-    A ridge of another firmness (`factor`) moves the estimate, and not how far from the truth the
-    starting values plausibly are: that stays `spread`."""
+        p = tr(H (H + F)⁻¹),   S = (n Σ_w ω_w g_w g_wᵀ + p H)/(n + p)
+        cov = (H + F)⁻¹ (n/(n - 1) S + F²) (H + F)⁻¹
+
+    A ridge of another firmness (φ = `factor`) moves the estimate, and not how far from the truth
+    the starting values plausibly are: that stays s = `spread`. noise   σ²
+    """
     found = normal(model, values, data, _indices(free))
     scale = spread[free]
-    measured_information = found.gram * np.outer(scale, scale) / noise  # by the data
-    firm = np.eye(len(scale)) / factor**2  # the ridge
-    information = measured_information + firm
-    pulls = _used(found.pull, data.weight) * scale / noise * np.sqrt(data.weight)[:, None]
+    H = found.gram * np.outer(scale, scale) / noise
+    F = np.eye(len(scale)) / factor**2
+    information = H + F
+    g = _used(found.pull, data.weight) * scale / noise * np.sqrt(data.weight)[:, None]
     inverse = np.linalg.inv(information)
     # Few windows say little about how their gradients vary: the expected scatter counts as much
     # more windows as there are parameters that the data determine.
-    determined = float(np.trace(measured_information @ inverse))
-    count = float(data.weight.sum())
-    scatter = (count * pulls.T @ pulls + determined * measured_information) / (count + determined)
-    meat = count / max(count - 1.0, 1.0) * scatter + firm @ firm
+    p = float(np.trace(H @ inverse))
+    n = float(data.weight.sum())
+    S = (n * g.T @ g + p * H) / (n + p)
+    meat = n / max(n - 1.0, 1.0) * S + F @ F
     sandwich = inverse @ meat @ inverse
     whole = np.zeros((len(values), len(values)))
     whole[np.ix_(free, free)] = sandwich * np.outer(scale, scale)

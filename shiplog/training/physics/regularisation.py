@@ -2,7 +2,7 @@
 
 A network learns until its error on the validation voyages rises. An identification has no epochs;
 what keeps it from learning its own voyages by heart is the ridge, and its firmness is chosen on
-the same voyages.
+the same voyages: φ of the ridge Σ_i ((θ_i - θ₀_i)/(φ s_i))².
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ PLAUSIBLE = 1.0  # the spreads as they are published or estimated
 def ladder(
     fit: Callable[[float, np.ndarray | None], Identified], factors: Sequence[float]
 ) -> dict[float, Identified]:
-    """An identification for each factor on the spreads, the plausible ones among them.
+    """θ̂(φ): an identification for each factor φ on the spreads, the plausible ones among them.
 
     fit   gets the factor and where to begin: each begins where its neighbour nearer to 1 ended
     """
@@ -37,7 +37,7 @@ def ladder(
 
 
 def choose(judged: dict[float, np.ndarray]) -> float:
-    """Of the factors that are not worse than the best by more than chance, the nearest to 1.
+    """argmin |log φ| of the factors that are not worse than the best by more than chance.
 
     judged   factor → L of each validation window [N]; 1 where fewer than two can be judged
 
