@@ -63,14 +63,20 @@ def test_an_azimuth_that_passes_180_degrees_does_not_swing_round_the_other_way()
     assert slow == pytest.approx(frames.wrap(turned - behind)[:-1], abs=1e-9)
 
 
-def test_numbers_that_a_cause_did_not_have_when_a_run_was_extended_change_nothing():
-    """The catalogue's bank has three numbers; an earlier one had its strength alone."""
-    arrays = {"coefficients": np.zeros(3), "covariance": np.array([[0.04, 0.01], [0.01, 0.09]])}
-    causes = [{"label": "bank", "name": "bank", "made": {}, "numbers": [0.7]},
+@pytest.mark.parametrize("count", [1, 3, 4])
+def test_each_cause_of_an_extension_has_its_numbers_and_their_covariance(count):
+    """The catalogue's bank has three numbers; what has more or fewer is no extension."""
+    arrays = {"coefficients": np.zeros(3), "covariance": np.diag(np.arange(1.0, count + 2.0))}
+    causes = [{"label": "bank", "name": "bank", "made": {}, "numbers": [0.7] * count},
               {"label": "yaw_rate_bias", "name": "yaw_rate_bias", "made": {},
                "numbers": [0.001]}]  # fmt: skip
-    kept = Extension.of({"causes": causes, "shares": {}, "lengths": {}}, arrays)
-    assert kept.numbers["bank"].tolist() == [0.7, 0.0, 0.0]
-    assert kept.covariance["bank"] == pytest.approx(np.diag([0.04, 0.0, 0.0]), abs=1e-9)
+    facts = {"causes": causes, "shares": {}, "lengths": {}}
+    if count != 3:
+        with pytest.raises(ValueError, match=f"bank has {count} numbers, not 3"):
+            Extension.of(facts, arrays)
+        return
+    kept = Extension.of(facts, arrays)
+    assert kept.numbers["bank"].tolist() == [0.7] * 3
+    assert kept.covariance["bank"].tolist() == np.diag([1.0, 2.0, 3.0]).tolist()
     assert kept.numbers["yaw_rate_bias"].tolist() == [0.001]
-    assert kept.covariance["yaw_rate_bias"].tolist() == [[0.09]]
+    assert kept.covariance["yaw_rate_bias"].tolist() == [[4.0]]
