@@ -1,4 +1,4 @@
-"""A model is one file and one line: the example of docs/extending.md, the whole way."""
+"""A model is one file and one line: the example of docs/develop/extending.md, the whole way."""
 
 import importlib
 import json
@@ -19,7 +19,7 @@ from shiplog.ship_profile import file as profiles
 from shiplog.training.runs import load_model
 from shiplog.training.settings.run_config import Physics
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[2] / "docs" / "develop"
 LINE = re.compile(r'^ +("kt": Kind\(.*\),)$', re.MULTILINE)
 
 

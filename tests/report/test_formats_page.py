@@ -1,4 +1,4 @@
-"""The page of formats names every word that a machine may read."""
+"""The pages of formats name every word that a machine may read."""
 
 import re
 from pathlib import Path
@@ -11,7 +11,11 @@ from shiplog.models.causes.user import ANSWERS
 from shiplog.nomenclature.channels import UNUSABLE, Quality
 from shiplog.report.diagnosis.verdict import DEPENDS, Verdict
 
-PAGE = (Path(__file__).parents[2] / "docs" / "formats.md").read_text(encoding="utf-8")
+PAGES = Path(__file__).parents[2] / "docs" / "reference"
+PAGE = "\n".join(
+    (PAGES / f"{name}.md").read_text(encoding="utf-8")
+    for name in ("formats", "streams", "findings", "answers")
+)
 WORDS = set(re.findall(r"`([^`]+)`", PAGE))
 ROWS = {
     cells[0]: cells[1:]

@@ -20,10 +20,10 @@ from shiplog.report.evaluation import tables
 FORMER, PRESENT = "former", "present"
 TITLE = "# Former and present decision on the same cases"
 COMMAND = """\
-    python -m pipelines.experiments.hidden_effects compare docs/results/former-answers.tar.xz \\
-        docs/validation-answers.tar.xz --markdown docs/results/former_decision.md"""
+    python -m pipelines.experiments.hidden_effects compare docs/evidence/former-answers.tar.xz \\
+        docs/evidence/validation-answers.tar.xz --markdown docs/evidence/former_decision.md"""
 INTRODUCTION = """\
-The cases are those of [validation](../validation.md) that both programs answered; its words and
+The cases are those of [validation](validation.md) that both programs answered; its words and
 goals hold here too. Both had the same logs and profiles. Each made its own store and identified its
 own model.
 The *former* decision is the one that this decision replaced: its rules had grown case by case.

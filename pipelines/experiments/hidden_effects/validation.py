@@ -1,7 +1,7 @@
 """The validation page: what went wrong, then every score, of all cases of one program.
 
 Written by `python -m pipelines.experiments.hidden_effects scores DIR [DIR ...]
---markdown docs/validation.md`.
+--markdown docs/evidence/validation.md`.
 """
 
 from __future__ import annotations
@@ -90,14 +90,14 @@ def page(found: Sequence[Score], path: Path | None = None) -> Page:
 
 
 COMMAND = """\
-    python -m pipelines.experiments.hidden_effects scores docs/validation-answers.tar.xz \\
-        --markdown docs/validation.md"""
+    python -m pipelines.experiments.hidden_effects scores docs/evidence/validation-answers.tar.xz \\
+        --markdown docs/evidence/validation.md"""
 INTRODUCTION = """\
 How often a verdict of `shiplog diagnose` is right, measured on simulated ships. In each case a ship
 makes a nominal campaign, from which a model is identified (`train --model mmg`). In a later trial
 of 7000 or 500 s (longer for a large ship) nothing is hidden, or one cause of the
-[catalogue](catalogue.md), or two causes, or an effect outside the catalogue. Each verdict was
-stored with its hash before the hidden answer was read. The [glossary](glossary.md) defines the
+[catalogue](../reference/catalogue.md), or two causes, or an effect outside the catalogue. Each verdict was
+stored with its hash before the hidden answer was read. The [glossary](../science/glossary.md) defines the
 terms of a verdict.
 
 *Same family of equations*: a ship of MMG form, as the model is. The simulator shares no code with
@@ -135,7 +135,7 @@ Words of the tables:
   probable ones. Calibration error, *reported with 0.9 or more* and the reliability diagram are over
   statements. A statement can be true in a case whose verdict is not right.
 - **Probability** in the lists of what went wrong is that of the first statement. It is 0.00 where
-  the remainder is not in the ranking: by [rule 10](diagnosis.md#rules) a wrong sign, or a model
+  the remainder is not in the ranking: by [rule 10](../science/rules.md) a wrong sign, or a model
   worse than constant velocities, is answered `unknown`, whatever the ranking is.
 - **Outside the catalogue**, with the right remainder: `tether`, a line to a fixed point (position);
   `tow`, a force in one direction that grows during the trial (time); `propeller_side_force`, a
@@ -164,7 +164,7 @@ RIVALS = {
     "glr": "- **Likelihood ratio** compares rollouts with and without each cause, the errors taken "
     "as white noise. It, too, names one cause or none.",
 }
-# The machine is that of docs/validation-answers.tar.xz: the answers do not record it.
+# The machine is that of docs/evidence/validation-answers.tar.xz: the answers do not record it.
 COST = """\
 Processor time, elapsed time and memory of `shiplog diagnose`, a case, on an Intel Xeon, each
 case on one core. Two cases ran at a time on two cores that also had other work: elapsed time is

@@ -6,7 +6,7 @@ JUDGEMENTS: dict[str, str] = {
     "esso-osaka": (
         "Believable. The tests are of one ship, from July to November 2020, and no change of the "
         "ship is known. In the berthings of 12 November the yaw rate is about 0.9 s late ([Esso "
-        "Osaka](results/esso_osaka.md)); such berthings are among the nominal voyages, too, so "
+        "Osaka](esso_osaka.md)); such berthings are among the nominal voyages, too, so "
         "that this is no change between the two campaigns. Eight tests are too few to confirm it. "
         "On tests that were held out, the physics have half of the regression's L."
     ),

@@ -15,12 +15,12 @@ WIDTH = 100  # letters of a line
 HEAD = """# Measured ships, from their files to a verdict
 
     python -m pipelines.experiments.measured_ships DATA --out measured \\
-        --markdown docs/measured_ships.md
+        --markdown docs/evidence/measured_ships.md
 
 Each data set is treated as its owner would treat it: a profile (shipped, or drafted and completed
 where it says CHECK), `convert`, `ingest`, `train --model mmg`, `evaluate`, and `diagnose` on the
 voyages that were not trained on. It ends with a verdict, or with what these data lack for one. None
-of the data are part of this repository. L is the paper's loss ([glossary](glossary.md)); the
+of the data are part of this repository. L is the paper's loss ([glossary](../science/glossary.md)); the
 baselines hold the velocity, and fit a quadratic by least squares to the training voyages. Where
 that one has a *, the training voyages are among those that L is of. The split of the voyages is
 shiplog's and not the published one, so that L is not comparable with that of other pages. One file
