@@ -17,6 +17,7 @@ import polars as pl
 
 SOURCE = Path("docs/start/tour.py")
 CELL = "# %%"
+FIRST, LAST, WIDE = 22, 12, 170  # lines that are kept of an output, and letters of a line
 HEAD = """\
 This page is the notebook `docs/start/tour.py` with what its cells show, written by `python -m
 pipelines.experiments.site.tour`. The numbers are of one machine: trainings round differently on
@@ -49,6 +50,15 @@ def shown(code: str, names: dict[str, object]) -> str:
     return printed.getvalue().rstrip()
 
 
+def shortened(output: str) -> str:
+    """A long output without its middle, each line no wider than a page."""
+    lines = [one if len(one) <= WIDE else f"{one[: WIDE - 2]} …" for one in output.splitlines()]
+    if len(lines) > FIRST + LAST + 2:
+        cut = len(lines) - FIRST - LAST
+        lines = [*lines[:FIRST], f"  … {cut} lines more …", *lines[-LAST:]]
+    return "\n".join(lines)
+
+
 def page(text: str) -> str:
     """The notebook as Markdown."""
     names: dict[str, object] = {}
@@ -60,7 +70,7 @@ def page(text: str) -> str:
                 continue
             parts.append(f"```python\n{content}\n```")
             if output := shown(content, names):
-                parts.append(f"```text\n{output}\n```")
+                parts.append(f"```text\n{shortened(output)}\n```")
     title, *rest = parts
     heading, _, after = title.partition("\n")
     return "\n\n".join((heading, HEAD, after.strip(), *rest)) + "\n"

@@ -18,7 +18,7 @@ import numpy as np
 from shiplog.commands.diagnose import diagnose_run
 from shiplog.diagnosis.hypotheses.hypothesis import Hypothesis, form_error
 from shiplog.diagnosis.hypotheses.search import Search
-from shiplog.diagnosis.noise.remainder import INTERMITTENT
+from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL
 from shiplog.diagnosis.verdict import posterior, refutation
 from shiplog.report.evaluation import tables
 from shiplog.voyages.store.store import Store
@@ -62,12 +62,11 @@ def weighed(search: Search) -> str:
     """The most probable hypotheses, term by term."""
     table = search.table
     found = posterior.posterior(search)
-    kept = [h for h in found.hypotheses if h.score > found.hypotheses[0].score - 10.0]
-    kept = list(dict.fromkeys((*kept, *found.hypotheses)))[:ROWS]
-    alone = [h for h in found.hypotheses if len(h.causes) <= 1 and h.kind == "nominal"]
-    order = list(dict.fromkeys(id(h) for h in (*kept, *alone)))
-    by = {id(h): (h, p) for h, p in zip(found.hypotheses, found.share, strict=True)}
-    rows = [_row(search, *by[one]) for one in order]
+    rows = [
+        _row(search, one, share)
+        for place, (one, share) in enumerate(zip(found.hypotheses, found.probability, strict=True))
+        if place < ROWS or (len(one.causes) <= 1 and one.kind == NOMINAL)
+    ]
     head = (
         "causes", "remainder", "log evidence", "log prior", "placebo", "allowance", "score", "P",
         "noise",
