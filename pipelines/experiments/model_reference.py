@@ -182,7 +182,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--docs", type=Path, default=Path("docs/reference"), help="the folder of the pages")
+    parser.add_argument(
+        "--docs", type=Path, default=Path("docs/reference"), help="the folder of the pages"
+    )
     folder = parser.parse_args().docs
     (folder / "catalogue.md").write_text(catalogue(), encoding="utf-8")
     (folder / "coefficients.md").write_text(coefficients(), encoding="utf-8")

@@ -70,9 +70,8 @@ Axes: x0 to the north, y0 to the east, x ahead, y to starboard, angles clockwise
 turns the bow to starboard; the wind's angle is where it blows from, clockwise from the bow.
 
 The [units](units.md) of a value and the channels of a table's columns have a page of their own.
-`shiplog/profiles/` holds the profiles SHIPPED
-to start from. [catalogue.md](catalogue.md) lists what a cause of a diagnosis needs of a profile, and
-[coefficients.md](coefficients.md) the file `my-ship.mmg.toml` that may stand next to it.
+[Catalogue](catalogue.md) lists what a cause of a diagnosis needs of a profile, and
+[coefficients](coefficients.md) the file `my-ship.mmg.toml` that may stand next to it.
 """
 
 MEANT = {  # each kind of a sensor in words
@@ -119,7 +118,10 @@ def text() -> str:
     sensor = [name for name in profile.Sensor.model_fields if name not in source]
     return "\n".join(
         (
-            HEAD.replace("SHIPPED", ", ".join(f"`{name}`" for name in profile_file.shipped())),
+            HEAD,
+            "Profiles to start from, in `shiplog/profiles/`: "
+            + ", ".join(f"`{name}`" for name in profile_file.shipped())
+            + ".\n",
             "## [ship]\n",
             "Missing values are estimated where they are needed, and reported.\n",
             _keys(profile.Ship),

@@ -1,4 +1,4 @@
-"""Every data set at hand, from its files to a verdict: the table of docs/evidence/measured_ships.md.
+"""Every data set at hand, from its files to a verdict: docs/evidence/measured_ships.md.
 
     python -m pipelines.experiments.measured_ships DATA --out measured [--only NAME ...]
         [--markdown PATH]

@@ -19,13 +19,13 @@ HEAD = """# Measured ships, from their files to a verdict
 
 Each data set is treated as its owner would treat it: a profile (shipped, or drafted and completed
 where it says CHECK), `convert`, `ingest`, `train --model mmg`, `evaluate`, and `diagnose` on the
-voyages that were not trained on. It ends with a verdict, or with what these data lack for one. None
-of the data are part of this repository. L is the paper's loss ([glossary](../science/glossary.md)); the
-baselines hold the velocity, and fit a quadratic by least squares to the training voyages. Where
-that one has a *, the training voyages are among those that L is of. The split of the voyages is
-shiplog's and not the published one, so that L is not comparable with that of other pages. One file
-of the Esso Osaka repeats the beginning of another; it is included here, which gives 121 windows
-instead of 119.
+voyages that were not trained on. It ends with a verdict, or with what these data lack for one.
+None of the data are part of this repository. L is the paper's loss
+([glossary](../science/glossary.md)); the baselines hold the velocity, and fit a quadratic by
+least squares to the training voyages. Where that one has a *, the training voyages are among
+those that L is of. The split of the voyages is shiplog's and not the published one, so that L is
+not comparable with that of other pages. One file of the Esso Osaka repeats the beginning of
+another; it is included here, which gives 121 windows instead of 119.
 
 *Explained* is the share of the error on held-out windows that the named causes take away. The
 paragraph below each answer is the authors' judgement of it.
