@@ -25,12 +25,13 @@ def commands() -> str:
 
 
 def _command(name: str, command: click.Command) -> str:
-    text, _, example = (command.help or "").partition("Example: ")
+    text, *examples = (command.help or "").split("Example: ")
     context = click.Context(command, info_name=f"shiplog {name}")
     usage = f"{context.command_path} {' '.join(command.collect_usage_pieces(context))}"
     blocks = [f"## {name}", _escaped(text.strip()), f"    {usage}", _rows(command, context)]
-    if example:
-        blocks.append("Example:\n\n    " + re.sub(r"\s+", " ", example).strip())
+    if examples:
+        lines = [re.sub(r"\s+", " ", one).strip() for one in examples]
+        blocks.append("\n    ".join(("Example:\n", *lines)))
     return "\n\n".join(blocks)
 
 
@@ -38,7 +39,7 @@ def _rows(command: click.Command, context: click.Context) -> str:
     lines = ["| argument or option | what it is |", "| --- | --- |"]
     for one in command.get_params(context):
         record = one.get_help_record(context)
-        if record is None:
+        if record is None or one.name == "help":
             continue
         name, what = record
         lines.append(f"| `{_cell(name)}` | {_escaped(_cell(what))} |")
