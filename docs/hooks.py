@@ -42,6 +42,7 @@ def _rows(command: click.Command, context: click.Context) -> str:
         if record is None or one.name == "help":
             continue
         name, what = record
+        name = name.replace("|", " or ")  # no bar may stand in code within a table
         lines.append(f"| `{_cell(name)}` | {_escaped(_cell(what))} |")
     return "\n".join(lines)
 
