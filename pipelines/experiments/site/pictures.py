@@ -11,6 +11,7 @@ import argparse
 import itertools
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -161,7 +162,11 @@ PICTURES: dict[str, Callable[[], Figure]] = {
 
 def write(folder: Path) -> None:
     """All pictures into a folder."""
-    settings = {"svg.hashsalt": "shiplog", "font.family": "DejaVu Sans", "font.size": 10}
+    settings: dict[Any, Any] = {
+        "svg.hashsalt": "shiplog",
+        "font.family": "DejaVu Sans",
+        "font.size": 10,
+    }
     with matplotlib.rc_context(settings):
         for name, picture in PICTURES.items():
             picture().savefig(folder / f"{name}.svg", metadata={"Date": None})
