@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from safetensors.numpy import load_file, save_file
 
 from pipelines.experiments.simulated_ship import cases, sensors
 from shiplog.commands.diagnose import diagnose_run
@@ -20,7 +19,6 @@ from shiplog.diagnosis.trial.setup import trial_of
 from shiplog.diagnosis.trial.trial_voyages import in_ship_time, record_of
 from shiplog.diagnosis.verdict import network_base
 from shiplog.diagnosis.verdict.held_out import HeldOut
-from shiplog.exceptions import RunError
 from shiplog.report.diagnosis.verdict_sentence import less
 from shiplog.training.runs import extension_file, load_model
 from shiplog.training.settings.run_config import Config, Fast, NetworkSettings
@@ -210,16 +208,3 @@ def test_a_bent_network_is_kept_as_it_was_fitted_again(afloat):
     assert kept.base()[0].bent == pytest.approx(bent)
     further = again.with_causes((), {}, None, coefficients=np.full_like(bent, 1e-3))
     assert further.model.base.bent == pytest.approx(bent + 1e-3)
-
-
-def test_a_network_that_an_earlier_program_bent_is_reported(afloat):
-    plain = afloat.run.extended(afloat.run.config.seeds[0], afloat.recorded)
-    path = extension_file.extend(afloat.run, afloat.work / "earlier", plain)
-    assert load_model.load(path).extension is not None
-    file = path / "extension.safetensors"
-    arrays = dict(load_file(file))
-    save_file(arrays | {"coefficients": np.ones(72)}, file)
-    with pytest.raises(RunError, match="earlier shiplog"):
-        load_model.load(path)
-    save_file(arrays | {"coefficients": np.zeros(72)}, file)
-    assert load_model.load(path).base()[0].bent is None

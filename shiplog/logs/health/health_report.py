@@ -123,9 +123,9 @@ class VoyageReport:
         return cls(
             content["name"], counts["read"], counts["lost"], content["rows"], content["seconds"],
             tuple(Finding(**finding) for finding in content["findings"]),
-            content.get("usable_s"), content.get("windows"),
-            tuple(Instrument(**one) for one in content.get("instruments", ())),
-            tuple(NotCompared(**one) for one in content.get("not_compared", ())),
+            content["usable_s"], content["windows"],
+            tuple(Instrument(**one) for one in content["instruments"]),
+            tuple(NotCompared(**one) for one in content["not_compared"]),
         )  # fmt: skip
 
     def as_json(self) -> dict:

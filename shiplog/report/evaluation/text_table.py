@@ -57,12 +57,11 @@ def inert(markdown: str) -> str:
 
 
 def catalogue(entries: Sequence[CatalogueEntry]) -> str:
-    """What is in a store; figures that an older program did not write down stay open."""
+    """What is in a store."""
     rows = [
         (
             e.name, e.ship, e.start[:19], e.seconds,
-            *("-" if known is None else known for known in (e.rate_hz, e.usable_s, e.windows)),
-            e.findings,
+            "-" if e.rate_hz is None else e.rate_hz, e.usable_s, e.windows, e.findings,
         )
         for e in entries
     ]  # fmt: skip
