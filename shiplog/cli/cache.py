@@ -22,6 +22,7 @@ def cache(
     Example: shiplog cache --clear
     """
     from shiplog.report.evaluation.text_table import table
+    from shiplog.report.result import Answer
 
     removed = disk_cache.trim(0 if clear else disk_cache.LIMIT)
     sizes = disk_cache.sizes()
@@ -46,4 +47,4 @@ def cache(
             kind: {"files": count, "bytes": total} for kind, (count, total) in sizes.items()
         },
     }
-    answer(text, content, json_to)
+    answer(Answer(text, content), json_to)

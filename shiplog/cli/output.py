@@ -15,26 +15,30 @@ from shiplog.exceptions import ShiplogError
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from shiplog.commands.prepare import Ingested
+    from shiplog.report.result import Result
+
 LOST = 3  # exit code: done, but something was lost or refused
 
 
-def answer(text: str, content: dict, json_to: str | None) -> None:
+def answer(result: Result, json_to: str | None) -> None:
     """Text on stdout, JSON where --json asks for it; `--json -` moves the text to stderr.
 
     Raises ShiplogError where the JSON cannot be written.
     """
     from shiplog.machine import files
 
+    text = result.text
     if json_to == "-":
         if text:
             typer.echo(text, err=True)
-        typer.echo(files.json_text(content))
+        typer.echo(files.json_text(result.json))
         return
     if text:
         _print(text)
     if json_to:
         try:
-            files.write_answer(Path(json_to), files.json_text(content))
+            files.write_answer(Path(json_to), files.json_text(result.json))
         except OSError as error:
             raise ShiplogError(
                 f"{json_to} cannot be written: {error.strerror}.",
@@ -83,12 +87,9 @@ def _cells(line: str) -> list[str]:
     return [cell.strip().replace("\\|", "|") for cell in cells]
 
 
-def leave(done, json_to: str | None) -> None:
+def leave(done: Ingested, json_to: str | None) -> None:
     """Answer; exit 1 where nothing could be taken, 3 where something was lost or refused."""
-    from shiplog.report.evaluation import tables
-
-    text = "\n".join(line for one in done.reports for line in tables.voyage_lines(one))
-    answer(text, tables.voyages_json(done.reports, done.refused), json_to)
+    answer(done, json_to)
     for path, error in done.refused.items():
         typer.echo(f"{Path(path).name} refused: {error}", err=True)
     for path, what in done.lost.items():

@@ -31,19 +31,31 @@ from shiplog.logs.mcap_file.refusals import begins_as_log, refuse_log
 from shiplog.machine import files, reading_limits
 from shiplog.machine.paths import check_there, refuse_namesake
 from shiplog.machine.unexpected import unexpected
+from shiplog.nomenclature.contract import CONTRACT
 from shiplog.nomenclature.numbers import counted
+from shiplog.report.result import Printed
 from shiplog.ship_profile.profile import Column, Profile
 
 log = logging.getLogger(__name__)
 
 
-@dataclass
-class Converted:
+@dataclass(frozen=True, repr=False)
+class Converted(Printed):
     """The logs that were written, what was refused, and what of the others was lost."""
 
     logs: list[Path] = field(default_factory=list)
     refused: dict[str, str] = field(default_factory=dict)
     lost: dict[str, str] = field(default_factory=dict)
+    out: Path | None = None
+
+    @property
+    def text(self) -> str:
+        return f"{counted(len(self.logs), 'log')} in {self.out}"
+
+    @property
+    def json(self) -> dict:
+        logs = [str(path) for path in self.logs]
+        return {"contract": CONTRACT, "logs": logs, "refused": self.refused, "lost": self.lost}
 
 
 def convert(sources: list[Path], profile: Profile | None, out: Path) -> Converted:
@@ -51,7 +63,7 @@ def convert(sources: list[Path], profile: Profile | None, out: Path) -> Converte
 
     profile  says what a single table's columns are; NMEA, bags and folders do without
     """
-    done = Converted()
+    done = Converted(out=out)
     for path in tracked(bags_once(sources), "converting"):
         try:
             reading_limits.begin(path)

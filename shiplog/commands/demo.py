@@ -16,6 +16,7 @@ from shiplog.exceptions import listed
 from shiplog.machine.paths import refuse_no_season, refuse_none_ingested, sample_logs
 from shiplog.report import viewer
 from shiplog.report.evaluation import tables
+from shiplog.report.result import Printed
 from shiplog.training.runs import run_folder
 from shiplog.training.runs.run_checks import refuse_other_rows
 from shiplog.training.settings.run_config import Config, Fast, Physics
@@ -30,8 +31,8 @@ NEXT_SEASON = "season2_*"  # the ship half a year later, with something hidden i
 RECIPE = Fast(iterations=200)  # a hundred fewer than by default: somebody waits for a demo
 
 
-@dataclass(frozen=True)
-class Demo:
+@dataclass(frozen=True, repr=False)
+class Demo(Printed):
     """What the demo says and where the recording is.
 
     complete   whether every log was taken, every message of it could be read, and all that the
@@ -39,7 +40,7 @@ class Demo:
     """
 
     text: str
-    content: dict
+    json: dict
     recording: Path
     complete: bool = True
 
@@ -84,7 +85,7 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
         extend=None if extended.exists() else extended,
     )  # fmt: skip
     both, repeated, drawn = [path], "nothing was named", diagnosis.drawn
-    content = result.content | {"diagnosis": diagnosis.verdict.as_json()}
+    content = result.json | {"diagnosis": diagnosis.verdict.as_json()}
     if extended.exists():
         both.append(extended)
         again = diagnose_run(extended, store, [NEXT_SEASON], out / "diagnosis-again")

@@ -13,19 +13,19 @@ from shiplog.commands import gpu as on_gpu
 from shiplog.commands import train_networks
 from shiplog.commands.evaluate import evaluate_runs
 from shiplog.exceptions import ShiplogError, listed
-from shiplog.logs.health.health_report import CONTRACT
 from shiplog.machine import files
 from shiplog.nomenclature.channels import VELOCITY
+from shiplog.nomenclature.contract import CONTRACT
 from shiplog.nomenclature.numbers import counted
 from shiplog.report import viewer
 from shiplog.report.evaluation.text_table import inert
 from shiplog.report.paper import figures, report, sets, statements
 from shiplog.report.paper.report import Results
+from shiplog.report.result import Answer
 from shiplog.ship_profile.profile import Profile
 from shiplog.training.network import gpu
 from shiplog.training.network.queue import Task
 from shiplog.training.runs import network_seeds, run_folder
-from shiplog.training.runs.provenance import Answer
 from shiplog.training.runs.run_checks import (
     refuse_none_trained,
     refuse_other_rows,

@@ -6,9 +6,10 @@ from pathlib import Path
 import pytest
 
 from shiplog.logs.conversion.write import LOG_CONTRACT, SCHEMAS
-from shiplog.logs.health.health_report import CONTRACT, FINDING_KINDS, Instrument, VoyageReport
+from shiplog.logs.health.health_report import FINDING_KINDS, Instrument, VoyageReport
 from shiplog.models.causes.user import ANSWERS
 from shiplog.nomenclature.channels import UNUSABLE, Quality
+from shiplog.nomenclature.contract import CONTRACT
 from shiplog.report.diagnosis.verdict import DEPENDS, Verdict
 
 PAGE = (Path(__file__).parents[2] / "docs" / "formats.md").read_text(encoding="utf-8")

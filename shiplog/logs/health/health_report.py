@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
 
-CONTRACT = 1
-
 
 @dataclass(frozen=True, slots=True)
 class Finding:

@@ -10,7 +10,6 @@ from pathlib import Path
 from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.hypotheses import intermittent
 from shiplog.diagnosis.linear import segments
-from shiplog.diagnosis.linear.linear_segments import Linear
 from shiplog.diagnosis.residual import next_manoeuvre
 from shiplog.diagnosis.residual.interval import Interval
 from shiplog.diagnosis.residual.omitted_inputs import Dependence
@@ -26,7 +25,6 @@ from shiplog.report.diagnosis.verdict_sentence import less, sentence
 from shiplog.ship_profile import differences as profile_differences
 from shiplog.ship_profile.profile import Profile
 from shiplog.simulation.error_reduction import Gain
-from shiplog.simulation.extended_simulator import ExtendedSimulator
 from shiplog.training.runs.load_model import Run
 from shiplog.voyages.rows import timescale
 from shiplog.voyages.rows.recording import Record
@@ -35,39 +33,11 @@ from shiplog.voyages.store import parts
 from shiplog.voyages.store.contradicted import Contradicted
 
 OTHERWISE = "the profile reads these logs otherwise than those of the model"
-RECORDING = "diagnosis.rrd"  # in the folder of a diagnosis
 FEWEST_SEGMENTS = 4  # that a verdict needs
 # Families in which a model errs outside its training data; such an error resembles noise, too.
 INPUTS = ("wind", "motion", "controls", "stochastic")
 OPEN = ("unknown", "undecided")  # what may be such an error
 LEAST_CANDIDATE = 0.1  # probability of an answer that is worth a test of its own
-
-
-@dataclass(frozen=True)
-class DiagnosedTrial:
-    """The verdict and the objects behind it.
-
-    simulated  trial and decision of the simulated model; of a network, not those of its MMG
-    whole   that trial, linearised on overlapping segments
-    held    the held-out windows; None where no stretch is long enough for one
-    after   the extended model; None without a named cause
-    drawn   whether the pictures could be drawn
-    """
-
-    verdict: Verdict
-    folder: Path
-    decision: Decision | None = None
-    trial: Trial | None = None
-    simulated: tuple[Trial, Decision] | None = None
-    whole: Linear | None = None
-    held: HeldOut | None = None
-    after: ExtendedSimulator | None = None
-    drawn: bool = True
-
-    @property
-    def recording(self) -> Path | None:
-        """Path of the Rerun recording; None where nothing was compared, or could be drawn."""
-        return self.folder / RECORDING if self.decision is not None and self.drawn else None
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ from shiplog.diagnosis.residual.next_manoeuvre import Advice
 from shiplog.diagnosis.residual.omitted_inputs import Dependence
 from shiplog.diagnosis.verdict.result import SIDE_THRUST, Decision, Named
 from shiplog.exceptions import listed
-from shiplog.logs.health.health_report import CONTRACT
 from shiplog.models.causes import Cause, Setting, si
 from shiplog.nomenclature.channels import VELOCITY
+from shiplog.nomenclature.contract import CONTRACT
 from shiplog.nomenclature.numbers import figure
 from shiplog.simulation.error_reduction import Gain
 

@@ -9,7 +9,7 @@ import polars as pl
 from shiplog.exceptions import listed
 from shiplog.nomenclature.numbers import counted
 from shiplog.report.evaluation import tables
-from shiplog.report.evaluation.evaluation import EvaluatedRuns
+from shiplog.report.evaluation.evaluation import Evaluation
 from shiplog.report.paper import statements
 from shiplog.report.paper.style import named
 from shiplog.training.runs.run_folder import RunFolder
@@ -33,7 +33,7 @@ class Results:
     losses: pl.DataFrame
     histories: pl.DataFrame
     compared: pl.DataFrame
-    evaluation: EvaluatedRuns
+    evaluation: Evaluation
 
 
 def summary(results: Results) -> pl.DataFrame:
