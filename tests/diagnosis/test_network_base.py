@@ -184,7 +184,7 @@ def test_a_networks_verdict_is_of_the_mmg_and_its_gain_of_the_network(afloat):
     judge = HeldOut(afloat.held.cut, trials.simulator(afloat.run, done.trial), done.trial)
     found = judge.gain(replace(done.decision, adapted=False))
     assert done.verdict.gain.before == pytest.approx(afloat.held.losses_before.sum(1).mean())
-    assert [c["name"] for c in done.verdict.causes] == ["current"]
+    assert [c.name for c in done.verdict.causes] == ["current"]
     output = [n for n in done.verdict.notes if "MMG" in n]
     assert "run is a network" in output[0] and less(found.reduction) in output[1]
     trial, decision = done.simulated

@@ -59,14 +59,14 @@ class Diagnosis(Printed):
     def causes(self) -> pl.DataFrame:
         """One row per named cause: name, probability and sentence."""
         schema = {"name": pl.String, "probability": pl.Float64, "sentence": pl.String}
-        rows = [tuple(cause.get(key) for key in schema) for cause in self.verdict.causes]
+        rows = [tuple(getattr(cause, key) for key in schema) for cause in self.verdict.causes]
         return pl.DataFrame(rows, schema, orient="row")
 
     @property
     def ranking(self) -> pl.DataFrame:
         """One row per answer: name and probability."""
         schema = {"name": pl.String, "probability": pl.Float64}
-        rows = [tuple(answer[key] for key in schema) for answer in self.verdict.ranking]
+        rows = [tuple(getattr(answer, key) for key in schema) for answer in self.verdict.ranking]
         return pl.DataFrame(rows, schema, orient="row")
 
     @property
