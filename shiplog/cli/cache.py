@@ -32,7 +32,6 @@ def cache(
         for kind, (count, total) in sizes.items()
     ]
     text = (
-        f"{table(('folder', 'what', 'files', 'MB'), rows)}\n\n"
         f"{disk_cache.folder()} holds {kept / 1e6:.1f} MB (at most "
         f"{disk_cache.LIMIT / 1e6:.0f} MB; the oldest files are removed first)."
     )
@@ -47,4 +46,4 @@ def cache(
             kind: {"files": count, "bytes": total} for kind, (count, total) in sizes.items()
         },
     }
-    answer(Answer(text, content), json_to)
+    answer(Answer((table(("folder", "what", "files", "MB"), rows), "", text), content), json_to)

@@ -42,4 +42,4 @@ def profile(
     if out is not None:
         files.write_text(out, text)
         text = f"draft written to {out}: look over every line that says CHECK"
-    answer(Answer(text, content), json_to)
+    answer(Answer((text,), content), json_to)

@@ -53,7 +53,7 @@ def voyages(
         if not json_to:
             raise missing
         typer.echo(missing, err=True)  # for machines, no store holds no voyage
-        answer(Answer("", {"contract": CONTRACT, "voyages": []}), json_to)
+        answer(Answer((), {"contract": CONTRACT, "voyages": []}), json_to)
         raise typer.Exit(1)
     if catalogue.unfinished(store):
         from shiplog.voyages.store.store import Store  # it loads polars, which takes 0.3 s
@@ -69,7 +69,7 @@ def voyages(
         entries = [entry for entry in entries if entry.name in chosen]
     text = text_table.catalogue(entries) if entries else f"no voyage in {store}"
     content = {"contract": CONTRACT, "voyages": [asdict(entry) for entry in entries]}
-    answer(Answer(text, content), json_to)
+    answer(Answer((text,), content), json_to)
     if left_out and not voyages:  # named while the others were read
         raise typer.Exit(LOST)
 

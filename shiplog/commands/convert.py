@@ -49,8 +49,8 @@ class Converted(Printed):
     out: Path | None = None
 
     @property
-    def text(self) -> str:
-        return f"{counted(len(self.logs), 'log')} in {self.out}"
+    def lines(self) -> list[str]:
+        return [f"{counted(len(self.logs), 'log')} in {self.out}"]
 
     @property
     def json(self) -> dict:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -39,7 +40,7 @@ class Demo(Printed):
                demo makes could be written
     """
 
-    text: str
+    lines: Sequence[str]
     json: dict
     recording: Path
     complete: bool = True
@@ -94,7 +95,7 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
     season = compare_runs(both, store, [NEXT_SEASON], out / "season2.rrd")
     took = time.monotonic() - began
     ending = (
-        f"{result.text}\n\nHalf a year later ({NEXT_SEASON}), the same ship:\n\n"
+        f"\nHalf a year later ({NEXT_SEASON}), the same ship:\n\n"
         f"{diagnosis.verdict.sentence}\n\nThe extended model, diagnosed again: {repeated}\n\n"
         f"Took {took:.0f} s. The voyages are in {store.path}, the runs in {out / 'runs'}, the "
         f"diagnosis in {out / 'diagnosis' / 'report.md'}.\n"
@@ -105,7 +106,7 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
     content |= {"season2_recording": str(season.written()), "seconds": round(took, 1)}
     content |= {"refused": {path: str(why) for path, why in done.refused.items()}}
     complete = done.complete and drawn and not (result.lost or season.lost)
-    return Demo(ending, content, result.written(), complete)
+    return Demo((*result.lines, ending), content, result.written(), complete)
 
 
 def _trained_already(path: Path, store: Store) -> bool:

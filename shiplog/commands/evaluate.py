@@ -153,8 +153,8 @@ class Comparison(Printed):
     lost: tuple[ShiplogError, ...] = ()
 
     @property
-    def text(self) -> str:
-        return f"{self.evaluation.text}\n\nRecording: {self.recording or 'none'}"
+    def lines(self) -> list[str]:
+        return [*self.evaluation.lines, "", f"Recording: {self.recording or 'none'}"]
 
     @property
     def json(self) -> dict:

@@ -263,4 +263,4 @@ def answer(run: Run, notes: Sequence[str], store_path: Path) -> Answer:
         "parameters": identified.to_dicts(),
         "split": run.config.split.model_dump(mode="json"),
     }
-    return Answer("\n".join(lines), content)
+    return Answer(lines, content)

@@ -43,9 +43,9 @@ class Ingested(Printed):
     store: Store | None = None
 
     @property
-    def text(self) -> str:
+    def lines(self) -> list[str]:
         """Of the logs that were taken."""
-        return "\n".join(line for one in self.reports for line in tables.voyage_lines(one))
+        return [line for one in self.reports for line in tables.voyage_lines(one)]
 
     @property
     def json(self) -> dict:
@@ -53,7 +53,7 @@ class Ingested(Printed):
 
     def __str__(self) -> str:
         refused = [f"{Path(path).name} refused: {error}" for path, error in self.refused.items()]
-        return "\n".join(one for one in (self.text, *refused) if one)
+        return "\n".join([*self.lines, *refused])
 
     @property
     def complete(self) -> bool:

@@ -57,7 +57,9 @@ def sensors_command(store_path: Path, voyages: Sequence[str]) -> Answer:
         text += [f"- {finding.sentence}" for finding in one.findings(profile)] + [""]
         text += _not_compared(one)
         content.append(_json(one, profile))
-    return Answer("\n".join(text).rstrip(), {"contract": CONTRACT, "campaigns": content})
+    while text and not text[-1]:
+        text.pop()
+    return Answer(text, {"contract": CONTRACT, "campaigns": content})
 
 
 def _not_compared(one: SensorCampaign) -> list[str]:

@@ -152,9 +152,10 @@ def answer(run: Run, store_path: Path) -> Answer:
     config = run.config
     best = {seed: float(run.history(seed)["validation"].min()) for seed in config.seeds}  # type: ignore[arg-type]
     line = ", ".join(f"{loss:.0f}" for loss in best.values())
-    text = (
-        f"{run.label} in {run.path}: best validation L {line} (seeds 0 to {config.seeds[-1]}).\n"
-        f"Split by {config.split.chosen_by}. Next: shiplog evaluate {run.path} --store {store_path}"
+    lines = (
+        f"{run.label} in {run.path}: best validation L {line} (seeds 0 to {config.seeds[-1]}).",
+        f"Split by {config.split.chosen_by}. "
+        f"Next: shiplog evaluate {run.path} --store {store_path}",
     )
     content = {
         "contract": CONTRACT,
@@ -164,4 +165,4 @@ def answer(run: Run, store_path: Path) -> Answer:
         "validation_loss": list(best.values()),
         "split": config.split.model_dump(mode="json"),
     }
-    return Answer(text, content)
+    return Answer(lines, content)

@@ -5,6 +5,7 @@ Each command has one frozen result. The command line prints it, and `import ship
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -12,7 +13,11 @@ from shiplog.report.evaluation.text_table import inert
 
 
 class Result(Protocol):
-    """`text` as the command prints it, `json` as --json writes it."""
+    """`text` as the command prints it, in `lines`, some of which are tables; `json` as --json
+    writes it."""
+
+    @property
+    def lines(self) -> Sequence[str]: ...
 
     @property
     def text(self) -> str: ...
@@ -24,7 +29,11 @@ class Result(Protocol):
 class Printed:
     """A result that prints as its text; a notebook shows that as Markdown."""
 
-    def __str__(self: Result) -> str:
+    @property
+    def text(self) -> str:
+        return "\n".join(self.lines)  # type: ignore[attr-defined]  # of a Result
+
+    def __str__(self) -> str:
         return self.text
 
     def _repr_markdown_(self) -> str:
@@ -38,7 +47,7 @@ class Answer(Printed):
     complete   whether nothing of what it was to write was lost
     """
 
-    text: str
+    lines: Sequence[str]
     json: dict
     complete: bool = True
 
@@ -46,4 +55,4 @@ class Answer(Printed):
         """The same after a warning, with facts for a machine; as it is without a warning."""
         if not warning:
             return self
-        return replace(self, text=f"{warning}\n{self.text}", json=self.json | facts)
+        return replace(self, lines=(warning, *self.lines), json=self.json | facts)

@@ -70,16 +70,16 @@ class Diagnosis(Printed):
         return pl.DataFrame(rows, schema, orient="row")
 
     @property
-    def text(self) -> str:
+    def lines(self) -> list[str]:
         """The page, and where the files are."""
-        lines = [page.markdown(self.verdict), f"Report: {self.report}"]
+        lines = [*page.lines(self.verdict), f"Report: {self.report}"]
         if self.recording is not None:
             lines.append(f"Recording: {self.recording}")
         elif not self.drawn:
             lines.append("Recording: none, it could not be made.")
         if self.extended is not None:
             lines.append(f"Extended model: {self.extended.path}")
-        return "\n".join(lines)
+        return lines
 
     @property
     def json(self) -> dict:

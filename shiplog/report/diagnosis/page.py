@@ -31,11 +31,15 @@ SECTIONS = (  # in the order of the page
 )
 
 
-def markdown(verdict: Verdict) -> str:
+def lines(verdict: Verdict) -> list[str]:
     """Markdown: the causes with numbers and gain, what was rejected or could not be tested and why,
     where errors are."""
-    lines = ["# Diagnosis", "", f"**{verdict.sentence}**", ""]
-    lines += [f"Model: {verdict.run}, {verdict.made}.", ""]
+    found = ["# Diagnosis", "", f"**{verdict.sentence}**", ""]
+    found += [f"Model: {verdict.run}, {verdict.made}.", ""]
     for section in SECTIONS:
-        lines += section(verdict)
-    return "\n".join(lines)
+        found += section(verdict)
+    return found
+
+
+def markdown(verdict: Verdict) -> str:
+    return "\n".join(lines(verdict))

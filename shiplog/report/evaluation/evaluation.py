@@ -90,7 +90,7 @@ class Evaluation(Printed):
         return judge(run.name, errors, self.baseline_losses, length, self.runs[0].config.window)
 
     @property
-    def text(self) -> str:
+    def lines(self) -> list[str]:
         """Markdown: a sentence a run, models and baselines, voyages, the worst windows of the
         first run."""
         answers = {f"{run.name}: {run.label}": self.answer(run) for run in self.runs}
@@ -119,4 +119,4 @@ class Evaluation(Printed):
             lines += ["", force_line(self.forces, self.voyages[0])]
         if self.too_short:
             lines += ["", f"Without a window of that length: {listed(self.too_short)}."]
-        return "\n".join(lines)
+        return lines

@@ -11,6 +11,7 @@ from shiplog.diagnosis.residual.next_manoeuvre import Advice
 from shiplog.diagnosis.verdict.result import SIDE_THRUST, Decision, Named
 from shiplog.exceptions import listed
 from shiplog.nomenclature.numbers import figure
+from shiplog.report.evaluation.text_table import table
 
 NINETY_SPREADS = 1.645  # standard deviations to either end of a 90 % interval
 WHICH = ("channel", "actuator")  # the part of a cause's label after the colon
@@ -155,19 +156,12 @@ def markdown(causes: Sequence[NamedCause]) -> list[str]:
 
 
 def _lines(cause: NamedCause) -> list[str]:
+    rows = [(name, *_row(one)) for name, one in cause.parameters.items()]
     lines = [
         f"## {cause.name} (probability {cause.probability:.2f})", "",
         cause.sentence, "", f"    {cause.equation}", "",
-        "| parameter | value | 90 % interval | unit |", "| --- | ---: | --- | --- |",
+        table(("parameter", "value", "90 % interval", "unit"), rows, ("value",)),
     ]  # fmt: skip
-    for name, p in cause.parameters.items():
-        if isinstance(p.value, str) or isinstance(p.low, str) or isinstance(p.high, str):
-            lines.append(f"| {name} | {p.value} | - | - |")
-        else:
-            lines.append(
-                f"| {name} | {figure(p.value, 4)} | {figure(p.low, 4)} to {figure(p.high, 4)} | "
-                f"{p.unit} |"
-            )
     if cause.indistinguishable_from:
         lines += [
             "", f"These data cannot tell it from {listed(cause.indistinguishable_from)}. "
@@ -179,3 +173,10 @@ def _lines(cause: NamedCause) -> list[str]:
             f"{figure(expected.nats, 3)} nats in {expected.seconds:.0f} s."
         )
     return [*lines, ""]
+
+
+def _row(one: Estimate) -> tuple[str, str, str]:
+    """Value, interval and unit; a channel or an actuator has no interval."""
+    if isinstance(one.value, str) or isinstance(one.low, str) or isinstance(one.high, str):
+        return str(one.value), "-", "-"
+    return figure(one.value, 4), f"{figure(one.low, 4)} to {figure(one.high, 4)}", one.unit

@@ -9,6 +9,7 @@ from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.verdict.result import Decision
 from shiplog.models.causes import Cause, Setting, si
 from shiplog.nomenclature.numbers import figure, percent
+from shiplog.report.evaluation.text_table import table
 
 HOPELESS = 30.0  # realistic sizes, beyond which a cause counts as undetectable
 
@@ -92,19 +93,20 @@ def not_shown(limits: Sequence[Limit]) -> NotShown:
 def markdown(limits: Sequence[Limit]) -> list[str]:
     if not limits:
         return []
-    lines = [
-        "## Smallest detectable sizes", "",
-        "A cause below this size may be present and not found: the change of each number alone, "
-        "and all numbers together as a share of the realistic size.", "",
-        "| cause | detectable from | of realistic size |", "| --- | --- | ---: |",
-    ]  # fmt: skip
+    rows = []
     for one in limits:
         numbers = ", ".join(
             f"{k.replace('_', ' ')} {_change(v)}" for k, v in one.parameters.items()
         )
         share = percent(one.share) if one.share < HOPELESS else "not detectable"
-        lines.append(f"| {one.label} | {numbers} | {share} |")
-    return [*lines, ""]
+        rows.append((one.label, numbers, share))
+    share = "of realistic size"
+    return [
+        "## Smallest detectable sizes", "",
+        "A cause below this size may be present and not found: the change of each number alone, "
+        "and all numbers together as a share of the realistic size.", "",
+        table(("cause", "detectable from", share), rows, (share,)), "",
+    ]  # fmt: skip
 
 
 def _change(size: Size) -> str:

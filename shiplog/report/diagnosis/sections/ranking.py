@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from shiplog.report.evaluation.text_table import table
+
 LEAST_SHARE = 0.01  # probability, below which an answer is not listed
 
 
@@ -29,5 +31,5 @@ def of(ranking: Mapping[str, float]) -> tuple[Ranked, ...]:
 def markdown(ranking: Sequence[Ranked]) -> list[str]:
     if not ranking:
         return []
-    rows = [f"| {one.name} | {one.probability:.3f} |" for one in ranking]
-    return ["## Ranking", "", "| answer | probability |", "| --- | ---: |", *rows, ""]
+    rows = [(one.name, f"{one.probability:.3f}") for one in ranking]
+    return ["## Ranking", "", table(("answer", "probability"), rows, ("probability",)), ""]
