@@ -11,10 +11,15 @@ from xdist.scheduler import LoadFileScheduling
 from shiplog.machine import disk_cache
 
 # Many small matrices: BLAS's threads would wait for each other. Set before numpy is loaded.
-for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NPROC"):
     os.environ.setdefault(_threads, "1")
 # What one worker, or a command that a test starts, has compiled serves the others.
 disk_cache.keep_compiled()
+
+import jax  # noqa: E402  # reads what was set above
+
+# Tests work answers out with JAX themselves; that shiplog needs no such switch has its own test.
+jax.config.update("jax_enable_x64", True)
 
 # Modules of more than twenty seconds, the longest first: the workers then end together. A module is
 # one worker's, with the fixtures that are made once for it.

@@ -150,21 +150,3 @@ def test_what_runs_no_network_does_not_load_torch():
         "train_again; sys.exit('torch' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", program], cwd=ROOT, check=False).returncode == 0
-
-
-def test_double_precision_is_switched_on_in_one_place():
-    """Of modules that compute with JAX, every one loads it."""
-    switch = "jax_enable_x64"
-    assert [p.name for p in SOURCES if switch in p.read_text(encoding="utf-8")] == ["jit_cache.py"]
-    program = (
-        "import importlib, sys, jax; importlib.import_module(sys.argv[1]); "
-        "sys.exit(not jax.config.jax_enable_x64)"
-    )
-    for module in (
-        "shiplog.models.extended",
-        "shiplog.models.mmg.hull",
-        "shiplog.diagnosis.trial.trial",
-        "shiplog.simulation.force_breakdown",
-    ):
-        done = subprocess.run([sys.executable, "-c", program, module], cwd=ROOT, check=False)
-        assert done.returncode == 0, module

@@ -17,7 +17,7 @@ from shiplog.commands.convert import convert
 from shiplog.commands.evaluate import evaluate_runs
 from shiplog.commands.prepare import expand, ingest_logs
 from shiplog.commands.train_networks import train_run
-from shiplog.report.evaluation.evaluation import EvaluatedRuns
+from shiplog.report.evaluation.evaluation import Evaluation
 from shiplog.ship_profile import file as profiles
 from shiplog.training.settings.run_config import Config
 from shiplog.voyages.store.store import Store
@@ -49,7 +49,7 @@ def trials_store(folder: Path, out: Path) -> Store:
     return store
 
 
-def run(folder: Path, out: Path, seeds: int, recipe: str) -> EvaluatedRuns:
+def run(folder: Path, out: Path, seeds: int, recipe: str) -> Evaluation:
     """Convert, ingest, train and evaluate; what stands in `out` already is not done again."""
     split, store = published_split(folder), trials_store(folder, out)
     path = out / f"feedforward-{recipe}"
@@ -67,7 +67,7 @@ def main() -> None:
     parser.add_argument("--recipe", choices=("fast", "paper"), default="fast")
     arguments = parser.parse_args()
     logging.basicConfig(format="%(message)s", level=logging.INFO)
-    print(run(arguments.folder, arguments.out, arguments.seeds, arguments.recipe).text())
+    print(run(arguments.folder, arguments.out, arguments.seeds, arguments.recipe))
 
 
 if __name__ == "__main__":

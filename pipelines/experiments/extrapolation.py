@@ -97,7 +97,7 @@ def samples(out: Path, network: bool = True) -> str:
             train_run(config, store, path)
         else:
             identify_run(config, store, path)
-    return evaluate_runs(runs, store, ("voyage_3", "voyage_4", "voyage_6")).text()
+    return evaluate_runs(runs, store, ("voyage_3", "voyage_4", "voyage_6")).text
 
 
 def physics(store: Store, path: Path, split: Split, model: str = "mmg", fit: bool = True) -> Path:

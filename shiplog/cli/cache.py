@@ -22,6 +22,7 @@ def cache(
     Example: shiplog cache --clear
     """
     from shiplog.report.evaluation.text_table import table
+    from shiplog.report.result import Answer
 
     removed = disk_cache.trim(0 if clear else disk_cache.LIMIT)
     sizes = disk_cache.sizes()
@@ -31,7 +32,6 @@ def cache(
         for kind, (count, total) in sizes.items()
     ]
     text = (
-        f"{table(('folder', 'what', 'files', 'MB'), rows)}\n\n"
         f"{disk_cache.folder()} holds {kept / 1e6:.1f} MB (at most "
         f"{disk_cache.LIMIT / 1e6:.0f} MB; the oldest files are removed first)."
     )
@@ -46,4 +46,4 @@ def cache(
             kind: {"files": count, "bytes": total} for kind, (count, total) in sizes.items()
         },
     }
-    answer(text, content, json_to)
+    answer(Answer((table(("folder", "what", "files", "MB"), rows), "", text), content), json_to)

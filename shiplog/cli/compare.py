@@ -49,7 +49,7 @@ def compare(
     from shiplog.voyages.store.store import Store
 
     result = compare_runs(runs, Store(store), voyages or [], to, cause or [])
-    answer(result.text, result.content, json_to)
+    answer(result, json_to)
     lost = list(result.lost)
     if save is None and result.recording is not None:
         try:

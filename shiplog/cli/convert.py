@@ -40,11 +40,9 @@ def convert(
 
     ship = profiles.load(profile) if profile else None
     from shiplog.commands.convert import convert as convert_tables
-    from shiplog.nomenclature.numbers import counted
 
     done = convert_tables(tables, ship, out)
-    content = {"contract": 1, "logs": [str(path) for path in done.logs], "refused": done.refused}
-    answer(f"{counted(len(done.logs), 'log')} in {out}", content | {"lost": done.lost}, json_to)
+    answer(done, json_to)
     for path, why in done.refused.items():
         typer.echo(f"{Path(path).name} refused: {why}", err=True)
     for path, what in done.lost.items():

@@ -38,7 +38,7 @@ def demo(
         from shiplog.commands.demo import run_demo
 
     result = run_demo(out, folder)
-    answer(result.text, result.content, json_to)
+    answer(result, json_to)
     if view:
         try:
             show(result.recording, web=False)

@@ -42,11 +42,12 @@ def diagnose(
     from shiplog.commands.bars import loading
 
     with loading():
-        from shiplog.commands.diagnose import diagnose_command
+        from shiplog.commands.diagnose import diagnose_run
+    from shiplog.voyages.store.store import Store
 
-    found = diagnose_command(
-        store, run, voyages=voyages or [], out=out, extend=extend, cause_files=cause or []
+    found = diagnose_run(
+        run, Store(store), voyages or [], out, extend=extend, cause_files=cause or []
     )
-    answer(found.text, found.content, json_to)
-    if not found.complete:
+    answer(found, json_to)
+    if not found.drawn:
         raise typer.Exit(LOST)

@@ -33,7 +33,7 @@ def evaluate(
     from shiplog.voyages.store.store import Store
 
     found = evaluate_runs([run], Store(store), voyages or [], cause or [])
-    answer(found.text(), found.answer(found.runs[0]), json_to)
+    answer(found, json_to)
     leave_lost(save(found))
     if set(found.too_short) & set(voyages or ()):  # by its own name, and the answer says so
         raise typer.Exit(LOST)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,28 +12,33 @@ import typer
 from shiplog.exceptions import ShiplogError
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from rich.table import Table as RichTable
+
+    from shiplog.commands.prepare import Ingested
+    from shiplog.report.evaluation.text_table import Table
+    from shiplog.report.result import Result
 
 LOST = 3  # exit code: done, but something was lost or refused
 
 
-def answer(text: str, content: dict, json_to: str | None) -> None:
+def answer(result: Result, json_to: str | None) -> None:
     """Text on stdout, JSON where --json asks for it; `--json -` moves the text to stderr.
 
     Raises ShiplogError where the JSON cannot be written.
     """
     from shiplog.machine import files
 
+    text = result.text
     if json_to == "-":
         if text:
             typer.echo(text, err=True)
-        typer.echo(files.json_text(content))
+        typer.echo(files.json_text(result.json))
         return
     if text:
-        _print(text)
+        _print(result.lines)
     if json_to:
         try:
-            files.write_answer(Path(json_to), files.json_text(content))
+            files.write_answer(Path(json_to), files.json_text(result.json))
         except OSError as error:
             raise ShiplogError(
                 f"{json_to} cannot be written: {error.strerror}.",
@@ -42,53 +46,40 @@ def answer(text: str, content: dict, json_to: str | None) -> None:
             ) from error
 
 
-def _print(text: str) -> None:
-    """Text on stdout. In a terminal its Markdown tables are drawn; in a file they stay Markdown."""
+def _print(lines: Sequence[str]) -> None:
+    """Text on stdout. In a terminal its tables are drawn; in a file they are Markdown."""
     if not sys.stdout.isatty():
-        typer.echo(text)
+        typer.echo("\n".join(lines))
         return
     from rich.console import Console
     from rich.text import Text
 
+    from shiplog.report.evaluation.text_table import Table
+
     console = Console()
-    lines = text.splitlines()
-    while lines:
-        size = next((i for i, line in enumerate(lines) if not line.startswith("|")), len(lines))
-        if size > 2:
-            console.print(_drawn(lines[:size]))
+    for line in lines:
+        if isinstance(line, Table) and line.rows:
+            console.print(_drawn(line))
         else:
-            size = max(size, 1)
-            console.print(Text("\n".join(lines[:size])), soft_wrap=True)
-        lines = lines[size:]
+            console.print(Text(line), soft_wrap=True)
 
 
-def _drawn(lines: Sequence[str]) -> Table:
-    """A Markdown table: its head, its rule, its rows."""
+def _drawn(table: Table) -> RichTable:
     from rich import box
-    from rich.table import Table
+    from rich.table import Table as RichTable
     from rich.text import Text
 
-    head, rule, *rows = map(_cells, lines)
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for title, dashes in zip(head, rule, strict=True):
-        table.add_column(Text(title), justify="right" if dashes.endswith(":") else "left")
-    for row in rows:
-        table.add_row(*map(Text, row))
-    return table
+    drawn = RichTable(box=box.SIMPLE_HEAD, pad_edge=False)
+    for title, right in zip(table.head, table.right, strict=True):
+        drawn.add_column(Text(title), justify="right" if right else "left")
+    for row in table.rows:
+        drawn.add_row(*map(Text, row))
+    return drawn
 
 
-def _cells(line: str) -> list[str]:
-    """Of a row, blank ones included; a bar inside a cell has a backslash before it."""
-    cells = re.split(r"(?<!\\)\|", line.strip().removeprefix("|").removesuffix("|"))
-    return [cell.strip().replace("\\|", "|") for cell in cells]
-
-
-def leave(done, json_to: str | None) -> None:
+def leave(done: Ingested, json_to: str | None) -> None:
     """Answer; exit 1 where nothing could be taken, 3 where something was lost or refused."""
-    from shiplog.report.evaluation import tables
-
-    text = "\n".join(line for one in done.reports for line in tables.voyage_lines(one))
-    answer(text, tables.voyages_json(done.reports, done.refused), json_to)
+    answer(done, json_to)
     for path, error in done.refused.items():
         typer.echo(f"{Path(path).name} refused: {error}", err=True)
     for path, what in done.lost.items():

@@ -86,8 +86,8 @@ def paper(
         ray=ray,
         device=device,
     )
-    answer(found.text, found.content, json_to)
-    if found.content["failures"]:
+    answer(found, json_to)
+    if found.json["failures"]:
         raise typer.Exit(LOST)
 
 

@@ -21,6 +21,10 @@ from shiplog.cli.app import app
 from shiplog.exceptions import ShiplogError
 from shiplog.machine import disk_cache
 
+# XLA shares a loop out to as many threads as the machine has cores, and rounds another way where
+# another thread begins. On one thread the numbers are the same on every number of cores, and a
+# diagnosis takes a fifth less processor time. XLA reads NPROC when it first computes.
+ONE_THREAD = "1"
 STOPPED = 130  # by Ctrl-C, as shells have it
 STOPPED_SENTENCE = "stopped; what was finished is kept"
 
@@ -36,6 +40,7 @@ def main() -> None:
     """Entry point: settings of this process, then `run`."""
     _open_missing()
     disk_cache.keep_compiled()
+    os.environ["NPROC"] = ONE_THREAD
     logging.basicConfig(format="%(message)s", handlers=[_Lines()], level=logging.WARNING)
     logging.getLogger("shiplog").setLevel(logging.INFO)
     for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):

@@ -34,10 +34,12 @@ def profile(
         refuse_taken(out)
         out = check_file(out, "--out")
     from shiplog.commands.convert import draft
+    from shiplog.nomenclature.contract import CONTRACT
+    from shiplog.report.result import Answer
 
     text = draft(log, vessel)
-    content = {"contract": 1, "profile": text, "written": None if out is None else str(out)}
+    content = {"contract": CONTRACT, "profile": text, "written": None if out is None else str(out)}
     if out is not None:
         files.write_text(out, text)
         text = f"draft written to {out}: look over every line that says CHECK"
-    answer(text, content, json_to)
+    answer(Answer((text,), content), json_to)

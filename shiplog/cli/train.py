@@ -133,13 +133,13 @@ def train(
         from shiplog.commands.train_again import again_command
 
         found = again_command(store, out, again)
-        answer(found.text, found.content, json_to)
+        answer(found, json_to)
         return
     check_voyages(store, voyages, validation)
     from shiplog.commands.train import train_command
 
     found = train_command(store, out, options)
-    answer(found.text, found.content, json_to)
+    answer(found, json_to)
 
 
 def _refuse_others(context: typer.Context) -> None:

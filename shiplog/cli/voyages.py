@@ -37,10 +37,12 @@ def voyages(
         from shiplog.commands.sensors import sensors_command
 
         found = sensors_command(store, voyages or [])
-        answer(found.text, found.content, json_to)
+        answer(found, json_to)
         return
 
+    from shiplog.nomenclature.contract import CONTRACT
     from shiplog.report.evaluation import text_table
+    from shiplog.report.result import Answer
     from shiplog.voyages.store import catalogue
 
     if not store.exists():
@@ -51,7 +53,7 @@ def voyages(
         if not json_to:
             raise missing
         typer.echo(missing, err=True)  # for machines, no store holds no voyage
-        answer("", {"contract": 1, "voyages": []}, json_to)
+        answer(Answer((), {"contract": CONTRACT, "voyages": []}), json_to)
         raise typer.Exit(1)
     if catalogue.unfinished(store):
         from shiplog.voyages.store.store import Store  # it loads polars, which takes 0.3 s
@@ -65,8 +67,9 @@ def voyages(
 
         chosen = parts.overlapping([e.name for e in entries], Store(store).select(voyages))
         entries = [entry for entry in entries if entry.name in chosen]
-    content = {"contract": 1, "voyages": [asdict(entry) for entry in entries]}
-    answer(text_table.catalogue(entries) if entries else f"no voyage in {store}", content, json_to)
+    text = text_table.catalogue(entries) if entries else f"no voyage in {store}"
+    content = {"contract": CONTRACT, "voyages": [asdict(entry) for entry in entries]}
+    answer(Answer((text,), content), json_to)
     if left_out and not voyages:  # named while the others were read
         raise typer.Exit(LOST)
 

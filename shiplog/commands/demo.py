@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from shiplog.exceptions import listed
 from shiplog.machine.paths import refuse_no_season, refuse_none_ingested, sample_logs
 from shiplog.report import viewer
 from shiplog.report.evaluation import tables
+from shiplog.report.result import Printed
 from shiplog.training.runs import run_folder
 from shiplog.training.runs.run_checks import refuse_other_rows
 from shiplog.training.settings.run_config import Config, Fast, Physics
@@ -30,16 +32,16 @@ NEXT_SEASON = "season2_*"  # the ship half a year later, with something hidden i
 RECIPE = Fast(iterations=200)  # a hundred fewer than by default: somebody waits for a demo
 
 
-@dataclass(frozen=True)
-class Demo:
+@dataclass(frozen=True, repr=False)
+class Demo(Printed):
     """What the demo says and where the recording is.
 
     complete   whether every log was taken, every message of it could be read, and all that the
                demo makes could be written
     """
 
-    text: str
-    content: dict
+    lines: Sequence[str]
+    json: dict
     recording: Path
     complete: bool = True
 
@@ -84,7 +86,7 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
         extend=None if extended.exists() else extended,
     )  # fmt: skip
     both, repeated, drawn = [path], "nothing was named", diagnosis.drawn
-    content = result.content | {"diagnosis": diagnosis.verdict.as_json()}
+    content = result.json | {"diagnosis": diagnosis.verdict.as_json()}
     if extended.exists():
         both.append(extended)
         again = diagnose_run(extended, store, [NEXT_SEASON], out / "diagnosis-again")
@@ -93,7 +95,7 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
     season = compare_runs(both, store, [NEXT_SEASON], out / "season2.rrd")
     took = time.monotonic() - began
     ending = (
-        f"{result.text}\n\nHalf a year later ({NEXT_SEASON}), the same ship:\n\n"
+        f"\nHalf a year later ({NEXT_SEASON}), the same ship:\n\n"
         f"{diagnosis.verdict.sentence}\n\nThe extended model, diagnosed again: {repeated}\n\n"
         f"Took {took:.0f} s. The voyages are in {store.path}, the runs in {out / 'runs'}, the "
         f"diagnosis in {out / 'diagnosis' / 'report.md'}.\n"
@@ -104,7 +106,7 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
     content |= {"season2_recording": str(season.written()), "seconds": round(took, 1)}
     content |= {"refused": {path: str(why) for path, why in done.refused.items()}}
     complete = done.complete and drawn and not (result.lost or season.lost)
-    return Demo(ending, content, result.written(), complete)
+    return Demo((*result.lines, ending), content, result.written(), complete)
 
 
 def _trained_already(path: Path, store: Store) -> bool:

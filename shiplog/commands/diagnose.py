@@ -31,12 +31,14 @@ from shiplog.machine.paths import check_diagnosis
 from shiplog.machine.unexpected import unexpected
 from shiplog.models.causes import Cause, user
 from shiplog.report.diagnosis import answer, diagnosis_pictures, page
-from shiplog.report.diagnosis.answer import Context, DiagnosedTrial
+from shiplog.report.diagnosis.answer import Context
+from shiplog.report.diagnosis.diagnosis import RECORDING, Diagnosis
 from shiplog.report.evaluation.text_table import inert
 from shiplog.ship_profile.profile import Profile
+from shiplog.simulation.extended_simulator import ExtendedSimulator
 from shiplog.training.runs import extension_file, load_model
 from shiplog.training.runs.load_model import Run
-from shiplog.training.runs.provenance import Answer, provenance
+from shiplog.training.runs.provenance import provenance
 from shiplog.training.runs.run_checks import refuse_other_ship
 from shiplog.voyages.rows.recording import Record
 from shiplog.voyages.store import contradicted, parts
@@ -66,7 +68,7 @@ def diagnose_run(
     *,
     extend: Path | None = None,
     cause_files: Sequence[Path] = (),
-) -> DiagnosedTrial:
+) -> Diagnosis:
     """The whole way. Raises ShiplogError."""
     began = time.time()
     check_diagnosis(out, extend)
@@ -82,19 +84,23 @@ def diagnose_run(
     used = [*names, *store.there(run.trained_on)]
     against = contradicted.of(store, dict.fromkeys(used))
     if contradicted.everywhere(against):
-        done = DiagnosedTrial(answer.contradicted(run, recorded, before_effect, against), out)
+        done = Diagnosis(answer.contradicted(run, recorded, before_effect, against), out)
     elif answer.enough(recorded):
         if nominal is not None and len(segments.begins(nominal)) < NOMINAL:
             nominal = None
         campaign = Campaigns(run, store, names, profile, recorded, nominal, before_effect, against)
         done = _decided(campaign, out, causes)
     else:
-        done = DiagnosedTrial(answer.too_little(run, recorded, before_effect), out)
+        done = Diagnosis(answer.too_little(run, recorded, before_effect), out)
     _save(done, store, names, began)
     done = _drawn(done)
-    if extend is not None:  # last: once it is there, the same command is refused
-        _extend(run, done, extend, cause_files)
-    return done
+    if extend is None:
+        return done
+    if done.after is None:
+        log.info("no named cause can be part of a model: %s is not written", extend)
+        return done
+    # last: once it is there, the same command is refused
+    return replace(done, extended=_extended(run, done.after, extend, cause_files, causes))
 
 
 @dataclass(frozen=True)
@@ -115,17 +121,17 @@ class Campaigns:
     against: Sequence[Contradicted] = ()
 
 
-def _decided(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTrial:
+def _decided(of: Campaigns, out: Path, causes: Sequence[Cause]) -> Diagnosis:
     """What was found; where no path of the model can be computed, that it diverges."""
     try:
         return _diagnosed(of, out, causes)
     except np.linalg.LinAlgError as error:  # of a matrix that only a model out of reach makes
         detailed = log.isEnabledFor(logging.DEBUG)
         log.info("no path of the model can be computed: %s", error, exc_info=detailed)
-        return DiagnosedTrial(answer.runs_away(of.run, of.recorded, of.before_effect), out)
+        return Diagnosis(answer.runs_away(of.run, of.recorded, of.before_effect), out)
 
 
-def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTrial:
+def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> Diagnosis:
     run, store, names, profile = of.run, of.store, of.names, of.profile
     recorded, nominal, before_effect = of.recorded, of.nominal, of.before_effect
     notes = answer.read_otherwise(run, profile)
@@ -138,7 +144,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
     if cut is not None and before is not None:
         simulator = run.extended(run.config.seeds[0], recorded)
         if why := sign_conventions.at_once(simulator, cut, before, profile):
-            return DiagnosedTrial(
+            return Diagnosis(
                 answer.other_convention(run, recorded, before_effect, why, of.against, notes), out
             )
     lacking = baseline_check.lacking(run, store, profile) if nominal is not None else run.lacks
@@ -199,7 +205,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
     )
     after = held.extended(decision) if held and decision.named else None
     verdict = answer.verdict(tried, decision, found, held, context)
-    return DiagnosedTrial(verdict, out, decision, tried, simulated, whole, held, after)
+    return Diagnosis(verdict, out, decision, tried, simulated, whole, held, after)
 
 
 def _nominal(run: Run, store: Store, profile: Profile) -> Record | None:
@@ -216,20 +222,27 @@ def _nominal_windows(of: Campaigns) -> Windows | None:
     return trial_voyages.windows_of(of.run, of.store, there, of.profile)
 
 
-def _write(done: DiagnosedTrial) -> None:
+def _write(done: Diagnosis) -> None:
     done.folder.mkdir(parents=True, exist_ok=True)
-    files.write_text(done.folder / "report.md", inert(page.markdown(done.verdict)))
+    files.write_text(done.report, inert(page.markdown(done.verdict)))
     files.write_json(done.folder / "verdict.json", done.verdict.as_json())
 
 
-def _save(done: DiagnosedTrial, store: Store, names: Sequence[str], began: float) -> None:
+def _save(done: Diagnosis, store: Store, names: Sequence[str], began: float) -> None:
     """Report, verdict and provenance; pictures of an earlier diagnosis do not stay."""
     _write(done)
-    files.remove(done.folder / answer.RECORDING)
+    files.remove(done.folder / RECORDING)
     files.write_json(done.folder / "provenance.json", provenance(store.hashes(names), began))
 
 
-def _drawn(done: DiagnosedTrial) -> DiagnosedTrial:
+def _extended(
+    run: Run, after: ExtendedSimulator, out: Path, own: Sequence[Path], causes: Sequence[Cause]
+) -> Run:
+    """The model with the named causes, as the run `out`."""
+    return load_model.load(extension_file.extend(run, out, after, own), causes)
+
+
+def _drawn(done: Diagnosis) -> Diagnosis:
     """The pictures, once the verdict is written. Where they fail, the answer says why."""
     if done.recording is None:
         return done
@@ -242,36 +255,3 @@ def _drawn(done: DiagnosedTrial) -> DiagnosedTrial:
         log.warning("%s", fault)
         return replace(done, drawn=False)
     return done
-
-
-def _extend(run: Run, done: DiagnosedTrial, out: Path, cause_files: Sequence[Path]) -> None:
-    """The named causes as a run of its own; none, and nothing is written."""
-    if done.after is None:
-        log.info("no named cause can be part of a model: %s is not written", out)
-        return
-    extension_file.extend(run, out, done.after, cause_files)
-
-
-def diagnose_command(
-    store_path: Path,
-    run: Path,
-    *,
-    voyages: Sequence[str],
-    out: Path,
-    extend: Path | None,
-    cause_files: Sequence[Path],
-) -> Answer:
-    """`shiplog diagnose`."""
-    done = diagnose_run(
-        run, Store(store_path), voyages, out, extend=extend, cause_files=cause_files
-    )
-    text = f"{page.markdown(done.verdict)}\nReport: {out / 'report.md'}"
-    content = done.verdict.as_json()
-    if done.recording is not None:
-        text += f"\nRecording: {done.recording}"
-        content["recording"] = str(done.recording)
-    elif not done.drawn:
-        text += "\nRecording: none, it could not be made."
-    if extend is not None and done.after is not None:
-        text += f"\nExtended model: {extend}"
-    return Answer(text, content, complete=done.drawn)

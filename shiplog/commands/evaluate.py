@@ -15,7 +15,9 @@ from shiplog.machine.paths import refuse_same_names
 from shiplog.machine.unexpected import unexpected
 from shiplog.models.causes import user
 from shiplog.nomenclature.channels import STATE
-from shiplog.report.evaluation.evaluation import EvaluatedRuns
+from shiplog.nomenclature.contract import CONTRACT
+from shiplog.report.evaluation.evaluation import Evaluation
+from shiplog.report.result import Printed
 from shiplog.report.viewer.comparison_data import BAND, ComparisonData, DrawnActuator
 from shiplog.simulation import baselines, prediction_interval, scoring
 from shiplog.simulation import coverage as covering
@@ -41,7 +43,7 @@ def evaluate_runs(
     store: Store,
     voyages: Sequence[str],
     cause_files: Sequence[Path] = (),
-) -> EvaluatedRuns:
+) -> Evaluation:
     """Roll every run's models out over the chosen voyages. Raises ShiplogError.
 
     cause_files   Python files of the causes of the user's own that are in these runs
@@ -76,7 +78,7 @@ def evaluate_runs(
     reach("coverage")
     covered = _coverage(first, rows, numbered, size)
     reach("forces")
-    return EvaluatedRuns(
+    return Evaluation(
         runs=opened,
         voyages=tuple(names),
         too_short=tuple(sorted(set(names) - set(cut.plan["voyage"]))),
@@ -95,7 +97,7 @@ def evaluate_runs(
     )
 
 
-def save(evaluation: EvaluatedRuns) -> tuple[ShiplogError, ...]:
+def save(evaluation: Evaluation) -> tuple[ShiplogError, ...]:
     """errors.parquet and rollouts.parquet into each run's folder. Returns what the system says of
     a folder that cannot be written, such as a colleague's: the evaluation is good all the same."""
     refused = []
@@ -108,7 +110,7 @@ def save(evaluation: EvaluatedRuns) -> tuple[ShiplogError, ...]:
     return tuple(refused)
 
 
-def comparison(evaluation: EvaluatedRuns, title: str) -> ComparisonData:
+def comparison(evaluation: Evaluation, title: str) -> ComparisonData:
     """What the viewer shows of an evaluation."""
     run = evaluation.runs[0]
     labels = {r.name: f"{r.name} ({r.config.legend})" for r in evaluation.runs}
@@ -127,7 +129,7 @@ def comparison(evaluation: EvaluatedRuns, title: str) -> ComparisonData:
             model=pl.col("run").replace_strict(labels, return_dtype=pl.String)
         ).drop("run"),
         training=run.training().select(profile.columns),
-        summary=evaluation.text(),
+        summary=evaluation.text,
         banks=profile.site.banks,
         trained=run.name if len(evaluation.runs) > 1 else "",
         forces=None
@@ -138,15 +140,28 @@ def comparison(evaluation: EvaluatedRuns, title: str) -> ComparisonData:
     )
 
 
-@dataclass(frozen=True)
-class Compared:
-    """What `compare` says and where the recording is; `lost`: what could not be written, and why.
-    Without the recording it is None, and all else is there."""
+@dataclass(frozen=True, repr=False)
+class Comparison(Printed):
+    """`recording` is a Rerun file of measured and simulated voyages, `evaluation` what it shows.
 
-    text: str
-    content: dict
+    lost   what could not be written, and why. Without the recording, `recording` is None and all
+           else is there
+    """
+
+    evaluation: Evaluation
     recording: Path | None
     lost: tuple[ShiplogError, ...] = ()
+
+    @property
+    def lines(self) -> list[str]:
+        return [*self.evaluation.lines, "", f"Recording: {self.recording or 'none'}"]
+
+    @property
+    def json(self) -> dict:
+        found = self.evaluation
+        where = None if self.recording is None else str(self.recording)
+        answers = {run.name: found.answer(run) for run in found.runs}
+        return {"contract": CONTRACT, "recording": where, "runs": answers}
 
     def written(self) -> Path:
         """The recording. Raises ShiplogError where it could not be written."""
@@ -161,7 +176,7 @@ def compare_runs(
     voyages: Sequence[str],
     save_to: Path | None,
     cause_files: Sequence[Path] = (),
-) -> Compared:
+) -> Comparison:
     """Evaluate the runs on the same windows and record both sides; in the first run's folder
     unless a path is given."""
     from shiplog.report import viewer
@@ -174,10 +189,7 @@ def compare_runs(
         viewer.save(comparison(found, title), recording)
     except ShiplogError as error:
         recording, lost = None, (*lost, error)
-    answers = {run.name: found.answer(run) for run in found.runs}
-    where = None if recording is None else str(recording)
-    content = {"contract": 1, "recording": where, "runs": answers}
-    return Compared(f"{found.text()}\n\nRecording: {where or 'none'}", content, recording, lost)
+    return Comparison(found, recording, lost)
 
 
 def _numbered(cut: Windows) -> pl.DataFrame:

@@ -14,8 +14,9 @@ from threadpoolctl import threadpool_limits
 
 from shiplog.commands.bars import reach, staged
 from shiplog.exceptions import listed
-from shiplog.logs.health.health_report import CONTRACT
+from shiplog.nomenclature.contract import CONTRACT
 from shiplog.report.evaluation import tables
+from shiplog.report.result import Answer
 from shiplog.simulation import prediction_interval
 from shiplog.simulation.sensitivities import Simulator, WindowSeries, losses, rollout
 from shiplog.training.physics import identifiability, physics_files
@@ -30,7 +31,7 @@ from shiplog.training.physics.output_error import Identified
 from shiplog.training.physics.setup import Prepared, prepare
 from shiplog.training.runs import load_model, plausible_model, run_folder
 from shiplog.training.runs.load_model import Run
-from shiplog.training.runs.provenance import Answer, provenance
+from shiplog.training.runs.provenance import provenance
 from shiplog.training.runs.run_folder import RunFolder
 from shiplog.training.settings.options import TrainOptions
 from shiplog.training.settings.run_config import Config
@@ -262,4 +263,4 @@ def answer(run: Run, notes: Sequence[str], store_path: Path) -> Answer:
         "parameters": identified.to_dicts(),
         "split": run.config.split.model_dump(mode="json"),
     }
-    return Answer("\n".join(lines), content)
+    return Answer(lines, content)

@@ -13,19 +13,19 @@ from shiplog.commands import gpu as on_gpu
 from shiplog.commands import train_networks
 from shiplog.commands.evaluate import evaluate_runs
 from shiplog.exceptions import ShiplogError, listed
-from shiplog.logs.health.health_report import CONTRACT
 from shiplog.machine import files
 from shiplog.nomenclature.channels import VELOCITY
+from shiplog.nomenclature.contract import CONTRACT
 from shiplog.nomenclature.numbers import counted
 from shiplog.report import viewer
 from shiplog.report.evaluation.text_table import inert
 from shiplog.report.paper import figures, report, sets, statements
 from shiplog.report.paper.report import Results
+from shiplog.report.result import Answer
 from shiplog.ship_profile.profile import Profile
 from shiplog.training.network import gpu
 from shiplog.training.network.queue import Task
 from shiplog.training.runs import network_seeds, run_folder
-from shiplog.training.runs.provenance import Answer
 from shiplog.training.runs.run_checks import (
     refuse_none_trained,
     refuse_other_rows,
@@ -96,7 +96,7 @@ def paper_command(
     finished, failures = train_sets(configs, store, out / "runs", jobs, ray, there)
     refuse_none_trained(finished, failures)
     results = collect(finished, failures, store)
-    text = write(results, chosen, store, out)
+    lines = write(results, chosen, store, out)
     content = {
         "contract": CONTRACT,
         "folder": str(out),
@@ -109,7 +109,7 @@ def paper_command(
         "floors": results.evaluation.means,
         "failures": failures,
     }
-    return Answer(text, content)
+    return Answer(lines, content)
 
 
 def choose_voyages(
@@ -226,7 +226,7 @@ def collect(finished: dict[str, RunFolder], failures: dict[str, str], store: Sto
     )
 
 
-def write(results: Results, chosen: Voyages, store: Store, out: Path) -> str:
+def write(results: Results, chosen: Voyages, store: Store, out: Path) -> list[str]:
     """Tables as Parquet, figures as SVG and PNG, report.md and paper.rrd in `out`. Returns the
     report."""
     numbers, drawn = out / "tables", out / "figures"
@@ -271,11 +271,12 @@ def write(results: Results, chosen: Voyages, store: Store, out: Path) -> str:
             figures.states(own, measured, ("ref", name), path(f"ref and {name}"))
     for name, frame in frames.items():
         files.write_frame(numbers / f"{name}.parquet", frame)
-    text = report.text(results, chosen.chosen_by, sizes)
+    lines = report.lines(results, chosen.chosen_by, sizes)
+    text = "\n".join(lines)
     files.write_text(out / "report.md", inert(text) + "\n")
     title = f"{profile.ship.name}: {counted(len(results.runs), 'window set')}"
     viewer.save_album(title, text, pictures, out / "paper.rrd")
-    return text
+    return lines
 
 
 def _longest(errors: pl.DataFrame) -> str:

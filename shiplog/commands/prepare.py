@@ -17,6 +17,7 @@ from shiplog.logs.reading.read import contents, read
 from shiplog.machine import reading_limits
 from shiplog.machine.unexpected import unexpected
 from shiplog.report.evaluation import tables
+from shiplog.report.result import Printed
 from shiplog.ship_profile import file as profiles
 from shiplog.ship_profile.profile import Profile
 from shiplog.voyages.ingest.fitting_profile import fitting_profile
@@ -28,14 +29,31 @@ from shiplog.voyages.store.store import Store
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class IngestedLogs:
-    """What became of each log: its report, or why it was refused; and what of a file that had to
-    become a log first is not in it."""
+@dataclass(frozen=True, repr=False)
+class Ingested(Printed):
+    """What became of logs: `store` holds those in `reports`; `refused` says why of the others.
 
-    reports: list[VoyageReport]
-    refused: dict[str, ShiplogError]
+    lost    what of a file that had to become a log first is not in it
+    store   None where logs were only checked
+    """
+
+    reports: list[VoyageReport] = field(default_factory=list)
+    refused: dict[str, ShiplogError] = field(default_factory=dict)
     lost: dict[str, str] = field(default_factory=dict)
+    store: Store | None = None
+
+    @property
+    def lines(self) -> list[str]:
+        """Of the logs that were taken."""
+        return [line for one in self.reports for line in tables.voyage_lines(one)]
+
+    @property
+    def json(self) -> dict:
+        return tables.voyages_json(self.reports, self.refused)
+
+    def __str__(self) -> str:
+        refused = [f"{Path(path).name} refused: {error}" for path, error in self.refused.items()]
+        return "\n".join([*self.lines, *refused])
 
     @property
     def complete(self) -> bool:
@@ -51,13 +69,13 @@ class IngestedLogs:
 
 def ingest_logs(
     paths: Sequence[Path], profile: str | None, store: Store, correct: bool = False
-) -> IngestedLogs:
+) -> Ingested:
     """Each log into the store; one that cannot be taken does not stop the others.
 
     correct  put right what the sensors say of each other beyond doubt
     """
     chosen = profiles.load(profile) if profile else None
-    done = IngestedLogs([], {})
+    done = Ingested(store=store)
     reported: set[str] = set()
     store.mend()  # else it would wait for the next voyage that is new
     for path, logs in _opened(tracked(paths, "ingesting"), chosen, done):
@@ -68,7 +86,7 @@ def ingest_logs(
 
 
 def _opened(
-    paths: Iterable[Path], chosen: Profile | None, done: IngestedLogs
+    paths: Iterable[Path], chosen: Profile | None, done: Ingested
 ) -> Iterator[tuple[Path, list[Path]]]:
     """Each path with the logs in it; one that cannot be opened is noted, and stops no other."""
     for path in paths:
@@ -89,7 +107,7 @@ def _opened(
 
 def _ingest_one(
     path: Path, source: Path | None, chosen: Profile | None, store: Store, correct: bool,
-    done: IngestedLogs, reported: set[str],
+    done: Ingested, reported: set[str],
 ) -> None:  # fmt: skip
     """One log, which was made of `source` if there is one, into the store."""
     try:
@@ -132,10 +150,10 @@ def expand(paths: Iterable[Path]) -> list[Path]:
     return found
 
 
-def check_logs(paths: Sequence[Path], profile: str | None = None) -> IngestedLogs:
+def check_logs(paths: Sequence[Path], profile: str | None = None) -> Ingested:
     """The health of each log by itself, and of its sensors by each other; nothing is stored."""
     chosen = profiles.load(profile) if profile else None
-    done = IngestedLogs([], {})
+    done = Ingested()
     for path, logs in _opened(tracked(expand(paths), "checking", expected_s), chosen, done):
         for one in logs:
             try:

@@ -8,10 +8,10 @@ from datetime import datetime
 from pathlib import Path
 
 from shiplog.exceptions import listed
-from shiplog.logs.health.health_report import CONTRACT
+from shiplog.nomenclature.contract import CONTRACT
 from shiplog.report.evaluation import tables
+from shiplog.report.result import Answer
 from shiplog.ship_profile.profile import Profile
-from shiplog.training.runs.provenance import Answer
 from shiplog.voyages.sensors import campaign_consistency
 from shiplog.voyages.sensors.campaign_consistency import SensorCampaign
 from shiplog.voyages.sensors.sensor_findings import Estimate
@@ -57,7 +57,9 @@ def sensors_command(store_path: Path, voyages: Sequence[str]) -> Answer:
         text += [f"- {finding.sentence}" for finding in one.findings(profile)] + [""]
         text += _not_compared(one)
         content.append(_json(one, profile))
-    return Answer("\n".join(text).rstrip(), {"contract": CONTRACT, "campaigns": content})
+    while text and not text[-1]:
+        text.pop()
+    return Answer(text, {"contract": CONTRACT, "campaigns": content})
 
 
 def _not_compared(one: SensorCampaign) -> list[str]:

@@ -17,7 +17,7 @@ from shiplog.voyages.windows.split import choose_physical_split, choose_split, s
 from shiplog.voyages.windows.split_settings import Split
 
 if TYPE_CHECKING:
-    from shiplog.training.runs.provenance import Answer
+    from shiplog.report.result import Answer
 
 
 def train_command(store_path: Path, out: Path, options: TrainOptions) -> Answer:

@@ -7,8 +7,8 @@ from pathlib import Path
 from shiplog.commands.bars import loading
 from shiplog.machine.paths import refuse_run
 from shiplog.models import NETWORK, PHYSICS
+from shiplog.report.result import Answer
 from shiplog.training.runs import run_folder
-from shiplog.training.runs.provenance import Answer
 from shiplog.training.runs.run_checks import refuse_extended
 from shiplog.training.runs.run_folder import RunFolder
 

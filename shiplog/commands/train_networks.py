@@ -14,8 +14,9 @@ import polars as pl
 
 from shiplog.commands.bars import Bars
 from shiplog.exceptions import listed
-from shiplog.logs.health.health_report import CONTRACT
 from shiplog.models.feedforward import scaling
+from shiplog.nomenclature.contract import CONTRACT
+from shiplog.report.result import Answer
 from shiplog.simulation import prediction_interval
 from shiplog.simulation.rollout import simulate
 from shiplog.training.network import gpu
@@ -24,7 +25,7 @@ from shiplog.training.network.queue import Task, work
 from shiplog.training.runs import load_model, run_folder
 from shiplog.training.runs.load_model import NetworkRun, Run
 from shiplog.training.runs.network_seeds import tasks_of, windows_of
-from shiplog.training.runs.provenance import Answer, provenance
+from shiplog.training.runs.provenance import provenance
 from shiplog.training.runs.run_checks import refuse_unended
 from shiplog.training.runs.run_folder import RunFolder
 from shiplog.training.settings.options import TrainOptions
@@ -151,9 +152,10 @@ def answer(run: Run, store_path: Path) -> Answer:
     config = run.config
     best = {seed: float(run.history(seed)["validation"].min()) for seed in config.seeds}  # type: ignore[arg-type]
     line = ", ".join(f"{loss:.0f}" for loss in best.values())
-    text = (
-        f"{run.label} in {run.path}: best validation L {line} (seeds 0 to {config.seeds[-1]}).\n"
-        f"Split by {config.split.chosen_by}. Next: shiplog evaluate {run.path} --store {store_path}"
+    lines = (
+        f"{run.label} in {run.path}: best validation L {line} (seeds 0 to {config.seeds[-1]}).",
+        f"Split by {config.split.chosen_by}. "
+        f"Next: shiplog evaluate {run.path} --store {store_path}",
     )
     content = {
         "contract": CONTRACT,
@@ -163,4 +165,4 @@ def answer(run: Run, store_path: Path) -> Answer:
         "validation_loss": list(best.values()),
         "split": config.split.model_dump(mode="json"),
     }
-    return Answer(text, content)
+    return Answer(lines, content)

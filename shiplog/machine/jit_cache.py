@@ -1,4 +1,9 @@
-"""JAX in double precision, and functions that are traced once for all ships that are alike.
+"""JAX in double precision where shiplog computes, and functions that are traced once for all ships
+that are alike.
+
+Double precision is of the thread and of the `with` block: whoever imports shiplog keeps the
+precision of JAX that they have. Functions that are traced take arrays of numpy and return them, so
+that no array of double precision is computed with in single precision afterwards.
 
 JAX needs seconds to trace a ship's equations with their derivatives, and milliseconds to load
 what it has traced before. All that a trace depends on is in its key, this program's source with
@@ -9,8 +14,8 @@ from __future__ import annotations
 
 import hashlib
 import logging
-import os
 from collections.abc import Callable, Hashable, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import fields, is_dataclass
 from typing import Any
 
@@ -21,12 +26,6 @@ from jax.core import Tracer
 
 from shiplog.machine import disk_cache, files
 
-jax.config.update("jax_enable_x64", True)  # float32 sensitivities do not distinguish causes
-# XLA shares a loop out to as many threads as the machine has cores, and rounds another way where
-# another thread begins. On one thread the numbers are the same on every number of cores, and a
-# diagnosis takes a fifth less processor time. XLA reads this when it first computes.
-os.environ["NPROC"] = "1"
-
 log = logging.getLogger(__name__)
 
 # The emitters of fused loops need twice the time to compile a ship's derivatives, and what they
@@ -34,8 +33,15 @@ log = logging.getLogger(__name__)
 COMPILER = {"xla_cpu_use_fusion_emitters": False}
 
 
+def double() -> AbstractContextManager:
+    """JAX in double precision, in this thread and until the block ends: float32 sensitivities do
+    not distinguish causes."""
+    return jax.enable_x64(True)
+
+
 class Traced:
-    """`jax.jit` of a function of arrays and pytrees; what is given by keyword is static."""
+    """`jax.jit` of a function of arrays and pytrees, in double precision; what is given by keyword
+    is static. The arrays that it returns are numpy's, to be read only."""
 
     def __init__(self, function: Callable) -> None:
         self._function = function
@@ -48,9 +54,10 @@ class Traced:
         leaves = [leaf if hasattr(leaf, "dtype") else np.asarray(leaf) for leaf in leaves]
         shapes = tuple((leaf.shape, str(leaf.dtype)) for leaf in leaves)
         key = (tree, shapes, tuple(sorted(static.items())))
-        if key not in self._known:
-            self._known[key] = self._compiled(tree, leaves, static, repr(key))
-        return self._known[key](*leaves)
+        with double():
+            if key not in self._known:
+                self._known[key] = self._compiled(tree, leaves, static, repr(key))
+            return jax.tree.map(np.asarray, self._known[key](*leaves))
 
     def _compiled(
         self, tree: Any, leaves: list, static: Mapping[str, Hashable], key: str

@@ -51,10 +51,6 @@ class Parameters:
     def entry(self, name: str) -> ParameterEntry:
         return self.entries[self.names.index(name)]
 
-    def neutral(self, name: str) -> float | None:
-        """The value that leaves a coefficient's term out; None where it has none."""
-        return self.entry(name).neutral if name in self.names else None
-
     def with_values(self, values: np.ndarray, source: str | None = None) -> Parameters:
         return replace(self, values=np.asarray(values), source=source or self.source)
 

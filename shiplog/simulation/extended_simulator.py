@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from shiplog.exceptions import RunError
 from shiplog.models.causes import CATALOGUE, Cause
@@ -24,7 +23,6 @@ from shiplog.voyages.windows.windows import Windows
 
 NUMBER_DRAWS = 12  # of the causes' numbers, for the spread of the states
 SEED = 0
-LATER_DEVIATION = 1e-6  # SI, of numbers that a cause did not have yet when a run was extended by it
 
 Shares = Mapping[str, tuple[float, float]]  # voyage → share of the campaign at its start and end
 
@@ -167,12 +165,7 @@ class Extension:
         facts: Mapping, arrays: Mapping[str, np.ndarray], own: Sequence[Cause] = ()
     ) -> Extension:
         """Back again; `own`: causes of the user's own. Raises RunError for one nobody knows, and
-        for an extension of an earlier program."""
-        if "coefficients" not in arrays:
-            raise RunError(
-                "The run was extended by an earlier shiplog, which kept no coefficients with it.",
-                hint="extend its base again with `shiplog diagnose --extend`.",
-            )
+        ValueError for one of another number of parameters."""
         by = {c.label: c for c in (*CATALOGUE, *own)}
         causes, numbers, covariance, at = [], {}, {}, 0
         for entry in facts["causes"]:
@@ -187,13 +180,12 @@ class Extension:
             cause = replace(kind, **made)
             causes.append(cause)
             values = np.array(entry["numbers"])
-            part = slice(at, at + len(values))
-            spread = np.atleast_2d(arrays["covariance"])[part, part]
-            # numbers that a cause did not have yet stay where they change nothing
-            later = cause.count - len(values)
-            numbers[cause.label] = np.append(values, np.zeros(later))
-            covariance[cause.label] = block_diag(spread, LATER_DEVIATION**2 * np.eye(later))
-            at += len(values)
+            if len(values) != cause.count:
+                raise ValueError(f"{cause.label} has {len(values)} numbers, not {cause.count}")
+            part = slice(at, at + cause.count)
+            numbers[cause.label] = values
+            covariance[cause.label] = np.atleast_2d(arrays["covariance"])[part, part]
+            at += cause.count
         constants = {
             k.removeprefix("constant."): v for k, v in arrays.items() if k.startswith("constant.")
         }

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 import polars as pl
 
+from shiplog.machine.jit_cache import traced
 from shiplog.nomenclature.channels import STATE
 from shiplog.ship_profile.profile import Profile
 from shiplog.simulation.sensitivities import Simulator, true_wind
@@ -17,23 +16,22 @@ def along(simulator: Simulator, seconds: pl.DataFrame, profile: Profile) -> pl.D
 
     seconds   the 1 Hz table with `elapsed`; the forces are those at the measured motion
     """
-    state = jnp.array(seconds.select([c.name for c in STATE]).to_numpy())
-    actuator = jnp.array(seconds.select(profile.actuator_names).to_numpy())
+    state = seconds.select([c.name for c in STATE]).to_numpy()
+    actuator = seconds.select(profile.actuator_names).to_numpy()
     if profile.has_wind:
-        blowing = true_wind(np.asarray(state), seconds.select(profile.wind_names).to_numpy())
+        blowing = true_wind(state, seconds.select(profile.wind_names).to_numpy())
     else:
         blowing = np.zeros((seconds.height, 2))
-    found = _parts(simulator.model, jnp.asarray(simulator.theta), state, actuator, blowing)
+    found = _parts(simulator.model, simulator.theta, state, actuator, blowing)
     found["total"] = sum(found.values())
     index = seconds.select("voyage", pl.col("elapsed").alias("time"))
     tables = []
-    for name, force in found.items():
-        values = np.asarray(force)
+    for name, values in found.items():
         columns = {axis: values[:, i] for i, axis in enumerate(("surge", "sway", "yaw"))}
         tables.append(index.with_columns(pl.lit(name).alias("part")).hstack(pl.DataFrame(columns)))
     return pl.concat(tables)
 
 
-@jax.jit
+@traced
 def _parts(model, theta, state, actuator, wind):
     return model.forces(theta, state, actuator, wind)

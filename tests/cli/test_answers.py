@@ -82,8 +82,8 @@ def test_a_voyage_that_cannot_be_read_is_lost_from_the_list(desk, capsys, caplog
 
 
 def test_blank_cells_and_bars_in_cells_are_drawn_in_their_columns():
-    drawn = output._drawn(table(("a", "L of x | y"), [("", 1.5), ("p|q", 2.0)]).splitlines())
+    drawn = output._drawn(table(("a", "L of x | y"), [("", 1.5), ("p|q", 2.0)]))
     assert [column.header.plain for column in drawn.columns] == ["a", "L of x | y"]
     cells = [[cell.plain for cell in column.cells] for column in drawn.columns]
     assert cells == [["", "p|q"], ["1.5", "2"]]
-    assert output._cells("| channel | gnss | | |") == ["channel", "gnss", "", ""]
+    assert [column.justify for column in drawn.columns] == ["left", "right"]

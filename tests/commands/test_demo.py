@@ -57,7 +57,7 @@ def test_the_demo_ends_with_a_recording_of_both_sides_and_resumes(tmp_path, monk
     logs = few_logs(tmp_path / "logs")
     (logs / "bad.mcap").write_bytes(b"no log")
     first = demo.run_demo(tmp_path / "demo", logs)
-    assert list(first.content["refused"]) == [str(logs / "bad.mcap")] and not first.complete
+    assert list(first.json["refused"]) == [str(logs / "bad.mcap")] and not first.complete
     assert f"rerun --bind 127.0.0.1 {first.recording}" in first.text
     assert "bad.mcap refused" in caplog.text
     output = str(RrdReader(str(first.recording)).store().summary())
@@ -69,11 +69,11 @@ def test_the_demo_ends_with_a_recording_of_both_sides_and_resumes(tmp_path, monk
     # What its README says is wrong with voyage_4: two spikes, and no GNSS for three seconds,
     # which position and velocity both lack.
     assert names["voyage_4"] == 4 and sum(names.values()) == 4
-    ref, doubled = first.content["runs"]["ref"], first.content["runs"]["d-ref"]
+    ref, doubled = first.json["runs"]["ref"], first.json["runs"]["d-ref"]
     assert ref["windows"] == doubled["windows"] == 12
     assert ref["voyages"]["voyage_6"]["coverage"] < 0.5
     assert "not in the training data: wind" in first.text
-    json.dumps(first.content)
+    json.dumps(first.json)
 
     trained = (
         (tmp_path / "demo" / "runs" / "ref" / "seed0" / "model.safetensors").stat().st_mtime_ns
@@ -87,7 +87,7 @@ def test_the_demo_ends_with_a_recording_of_both_sides_and_resumes(tmp_path, monk
     )  # fmt: skip
     (logs / "bad.mcap").unlink()
     again = demo.run_demo(tmp_path / "demo", logs)
-    assert drawn == [] and not again.content["refused"] and not again.complete
-    assert again.content["runs"] == first.content["runs"]
+    assert drawn == [] and not again.json["refused"] and not again.complete
+    assert again.json["runs"] == first.json["runs"]
     path = tmp_path / "demo" / "runs" / "ref" / "seed0" / "model.safetensors"
     assert path.stat().st_mtime_ns == trained

@@ -1,6 +1,7 @@
 """What a diagnosis has found stays found, whatever happens to its pictures."""
 
 import json
+from types import SimpleNamespace
 
 import pytest
 from commands import call
@@ -8,7 +9,7 @@ from commands import call
 from shiplog.commands import diagnose as pipeline
 from shiplog.exceptions import ShiplogError
 from shiplog.report.diagnosis import answer
-from shiplog.report.diagnosis.answer import DiagnosedTrial
+from shiplog.report.diagnosis.diagnosis import Diagnosis
 from shiplog.report.diagnosis.verdict import Verdict
 
 
@@ -17,9 +18,13 @@ def pictures(monkeypatch, tmp_path):
     """A diagnosis that is decided at once, and what it does then; `fault` ends the pictures."""
     done: list[str] = []
 
-    def decided(of, out, _causes) -> DiagnosedTrial:
+    def decided(of, out, _causes) -> Diagnosis:
         found: Verdict = answer.too_little(of.run, of.recorded, of.before_effect)
-        return DiagnosedTrial(found, out, decision=found, after=found)  # type: ignore[arg-type]  # stand-ins
+        return Diagnosis(found, out, decision=found, after=found)  # type: ignore[arg-type]  # stand-ins
+
+    def extended(_run, _after, out, *_):
+        done.append("extended run")
+        return SimpleNamespace(path=out)
 
     def broken_by(fault):
         def drawn(*_):
@@ -32,7 +37,7 @@ def pictures(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setattr(answer, "enough", lambda _: True)
     monkeypatch.setattr(pipeline, "_decided", decided)
-    monkeypatch.setattr(pipeline.extension_file, "extend", lambda *_: done.append("extended run"))
+    monkeypatch.setattr(pipeline, "_extended", extended)
     return broken_by
 
 

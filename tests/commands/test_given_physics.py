@@ -2,7 +2,6 @@
 
 import json
 import math
-import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -12,7 +11,6 @@ import numpy as np
 import pytest
 from commands import call
 from own_causes import GOOD
-from safetensors.numpy import load_file, save_file
 from short_voyages import BOTH, HULL, STATES, WINDOW, scored, train
 
 import shiplog
@@ -114,27 +112,6 @@ def test_an_extension_was_fitted_to_its_own_voyages_and_shows_no_forces(publishe
     assert kept.fitted_to == (*run.trained_on, "later")
     rows = run.training()
     assert run.forces(rows) is not None and kept.forces(rows) is None
-
-
-def test_a_run_made_before_linear_damping_simulates_what_it_did(published, tmp_path):
-    """Its folder holds neither names nor numbers of the five coefficients."""
-    old = tmp_path / "old"
-    shutil.copytree(published[0], old)
-    table = load_model.load(old).identified()
-    late = table["name"].is_in([f"hull.{key}" for key in ("x_u", "y_vl", "y_rl", "n_vl", "n_rl")])
-    assert late.sum() == 5
-    table.filter(~late).write_parquet(old / "seed0" / "identified.parquet")
-    arrays = load_file(old / "seed0" / "model.safetensors")
-    had = ~late.to_numpy()
-    arrays |= {"theta": arrays["theta"][had], "covariance": arrays["covariance"][had][:, had]}
-    save_file(
-        {k: np.ascontiguousarray(v) for k, v in arrays.items()}, old / "seed0" / "model.safetensors"
-    )
-    now, was = load_model.load(published[0]), load_model.load(old)
-    assert was.simulator(0).theta.tolist() == now.simulator(0).theta.tolist()
-    start = was.base()[1]
-    assert start.spread[late.to_numpy()].tolist() == [1e-9] * 5
-    assert start.spread[had].tolist() == now.base()[1].spread[had].tolist()
 
 
 def test_nothing_fitted_is_the_start_and_sure_of_nothing(published):

@@ -13,7 +13,7 @@ from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED
 from shiplog.diagnosis.verdict.decide import decide
 from shiplog.diagnosis.verdict.result import PATTERN, REFUTED
-from shiplog.report.diagnosis.verdict import cause_json, side_force_json
+from shiplog.report.diagnosis.sections import causes
 
 DRAG, LOAD, TWO = ("drag",), ("load",), ("two",)
 WIND, GNSS = ("clock:wind",), ("clock:gnss",)
@@ -270,8 +270,8 @@ def test_an_intermittent_force_is_a_device_only_where_it_is_on_or_off(trial):
         assert (found.fit.remainder.intermittent == tuple(intermittent)) == device
         assert found.nothing.remainder == found.fit.remainder
         if device:  # it is reported with the probability of the force
-            reported = side_force_json(found, [])
-            assert (reported["name"], reported["probability"]) == ("side_thrust", 0.98)
+            reported = causes.of_side_force(found, [])
+            assert (reported.name, reported.probability) == ("side_thrust", 0.98)
 
 
 def test_an_intermittent_force_of_unclear_pattern_may_be_a_device_or_not(trial):
@@ -325,7 +325,7 @@ def test_what_may_stand_in_a_place_is_at_most_a_hundred_times_less_probable(tria
     clock = ("clock:wind",)  # the label: what comes next asks for its columns
     (one,) = verdict(trial, {(DRAG, NOMINAL): 0.94, (clock, NOMINAL): 0.05}).named
     assert one.alike == clock
-    assert cause_json(one)["indistinguishable_from"] == ["clock"]
+    assert causes.of_named(one).indistinguishable_from == ("clock",)
 
 
 def test_why_a_special_case_is_not_named_is_not_said_by_itself(trial, monkeypatch):

@@ -250,7 +250,7 @@ def test_shallow_water_grows_by_another_law_than_the_catalogue_s():
 
 def test_the_bank_decays_and_pulls_by_another_law_than_the_catalogue_s():
     length, breadth, draught = 3.0, 0.5, 0.2
-    at = {"bank.lines": np.array([[-1e4, 40.0, 1e4, 40.0]]),
+    at = {"bank.lines": np.array([[-1e4, 40.0, 1e4, 40.0]]), "bank.same": np.eye(1),
           "bank.ship": np.array([length, breadth, draught, 1000.0])}  # fmt: skip
 
     def theirs(gap: float, u: float) -> np.ndarray:

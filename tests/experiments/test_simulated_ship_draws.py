@@ -66,6 +66,7 @@ def _bank_force(gap: float, speed: float) -> np.ndarray:
     ship = Ship()
     at["bank.lines"] = jnp.array([[-1e3, 40.0, 1e3, 40.0]])
     at["bank.ship"] = jnp.array([ship.length, ship.breadth, ship.draught, 998.0])
+    at["bank.same"] = jnp.eye(1)
     east = 40.0 - ship.breadth / 2 - gap
     return np.asarray(
         cause.force((1.0, 0.0, 0.0), jnp.array([0.0, speed, east, 0.0, 0.0, 0.0]), at)

@@ -9,8 +9,19 @@ from shiplog.diagnosis.trial.fitted import ExpectedEvidence
 from shiplog.models.causes.environment import Bank, Current, WindForce
 from shiplog.models.causes.sensors import HeadingOffset
 from shiplog.models.causes.ship import Fouling, RudderDelay, RudderLag
-from shiplog.report.diagnosis import answer, page, verdict
+from shiplog.report.diagnosis import answer, page
+from shiplog.report.diagnosis.sections import causes as named_causes
+from shiplog.report.diagnosis.sections import limits as smallest
+from shiplog.report.diagnosis.sections.causes import Estimate, NamedCause
+from shiplog.report.diagnosis.sections.limits import Limit, NotShown, Size
+from shiplog.report.diagnosis.sections.reasons import Reason
 from shiplog.report.diagnosis.verdict import Verdict
+from shiplog.report.evaluation.text_table import Table
+
+
+def table_of(lines):
+    (found,) = (line for line in lines if isinstance(line, Table))
+    return found
 
 
 def run_of(*voyages, given=False):
@@ -55,31 +66,26 @@ def test_too_little_says_how_much_more_is_needed(monkeypatch, seconds, unbroken,
 
 def test_each_unit_and_channel_has_a_row_of_its_own():
     limits = [
-        {"name": "thrust_loss", "actuator": "port", "share": 0.5, "parameters": {}},
-        {"name": "clock_offset", "channel": "wind", "share": 0.5, "parameters": {}},
-        {"name": "fouling", "share": 0.5, "parameters": {}},
+        Limit("thrust_loss", 0.5, {}, actuator="port"),
+        Limit("clock_offset", 0.5, {}, channel="wind"),
+        Limit("fouling", 0.5, {}),
     ]
-    rows = page._limits(SimpleNamespace(limits=limits))
-    assert [row.split("|")[1].strip() for row in rows[6:9]] == [
+    assert [row[0] for row in table_of(smallest.markdown(limits)).rows] == [
         "thrust_loss (port)", "clock_offset (wind)", "fouling",
     ]  # fmt: skip
 
 
 def test_sizes_of_a_large_ship_are_written_out():
-    limits = [{"name": "payload", "share": 0.5,
-               "parameters": {"mass": {"value": 123456.0, "unit": "kg"},
-                              "factor": {"value": 1.5, "unit": "1"}}}]  # fmt: skip
-    row = page._limits(SimpleNamespace(limits=limits))[6]
-    assert row == "| payload | mass 120000 kg, factor 150% | 50% |"
-    limits[0]["share"] = 0.004
-    row = page._limits(SimpleNamespace(limits=limits))[6]
-    assert row.endswith("| 0.4% |")
-    force = {"value": 12345.0, "low": 11000.0, "high": 14000.5, "unit": "N"}
-    cause = {
-        "name": "side_thrust", "probability": 0.95, "sentence": "A side force.", "equation": "Y",
-        "parameters": {"force": force}, "indistinguishable_from": [],
-    }  # fmt: skip
-    assert "| force | 12340 | 11000 to 14000 | N |" in page._cause(cause)
+    numbers = {"mass": Size(123456.0, "kg"), "factor": Size(1.5, "1")}
+    for share, words in ((0.5, "50%"), (0.004, "0.4%")):
+        (row,) = table_of(smallest.markdown([Limit("payload", share, numbers)])).rows
+        assert row == ("payload", "mass 120000 kg, factor 150%", words)
+    cause = NamedCause(
+        name="side_thrust", probability=0.95, sentence="A side force.", equation="Y",
+        parameters={"force": Estimate(12345.0, 11000.0, 14000.5, "N")},
+    )  # fmt: skip
+    (row,) = table_of(named_causes.markdown([cause])).rows
+    assert row == ("force", "12340", "11000 to 14000", "N")
 
 
 def test_a_number_that_no_data_would_reveal_is_left_out_of_the_limits():
@@ -87,29 +93,29 @@ def test_a_number_that_no_data_would_reveal_is_left_out_of_the_limits():
     uncertain factors besides."""
     causes = [Bank(), Fouling()]
     seen, hidden = np.array([10.0, 1.0, 1.0]), np.array([1e-4, 1e-5, 1e-5])
-    for each, strength in ((seen, {"value": 1.0, "unit": "1"}), (hidden, None)):
+    for each, strength in ((seen, Size(1.0, "1")), (hidden, None)):
         expected = {"bank": ExpectedEvidence(each, 0.0), "fouling": ExpectedEvidence(each[:1], 0.0)}
-        limits = verdict.limits_json(
+        limits = smallest.of(
             SimpleNamespace(expected=expected), causes, SimpleNamespace(prior=lambda p: p.prior)
         )
-        by = {one["name"]: one["parameters"] for one in limits}
+        by = {one.name: one.parameters for one in limits}
         assert by["bank"] == ({} if strength is None else {"strength": strength})
         assert bool(by["fouling"]) == (strength is not None)
 
 
 def test_a_special_case_of_a_cause_has_no_limits_of_its_own():
     expected = ExpectedEvidence(np.array([10.0, 1.0, 1.0]), 0.0)
-    (one,) = verdict.limits_json(
+    (one,) = smallest.of(
         SimpleNamespace(expected={"wind_force": expected, "wind_force:alike": expected}),
         [WindForce(), WindForce(alike=True)], SimpleNamespace(prior=lambda p: p.prior),
     )  # fmt: skip
-    assert one["name"] == "wind_force" and "channel" not in one
-    assert one["parameters"]["surge_factor"]["value"] == pytest.approx(0.3)
+    assert (one.name, one.channel) == ("wind_force", None)
+    assert one.parameters["surge_factor"].value == pytest.approx(0.3)
 
 
 def test_the_report_says_what_was_not_tested_and_why():
     """A cause that no sensor shows is not one that these data exclude."""
-    unavailable = ({"name": "bank", "reason": "the profile's [site] shows no bank"},)
+    unavailable = (Reason("bank", "the profile's [site] shows no bank"),)
     text = page.markdown(Verdict("none", "No change.", "run", True, "", unavailable=unavailable))
     assert "## Not testable\n\n- bank: the profile's [site] shows no bank\n" in text
     assert "Not testable" not in page.markdown(Verdict("none", "No change.", "run", True, ""))
@@ -131,11 +137,10 @@ def test_an_undecided_verdict_says_which_test_separates_its_candidates():
 
 def test_what_is_not_detectable_in_the_table_is_what_could_not_have_shown():
     limits = [
-        {"name": "thrust_loss", "actuator": "port", "share": 31.0, "parameters": {}},
-        {"name": "clock_offset", "channel": "wind", "share": 0.5, "parameters": {}},
-        {"name": "fouling", "share": 1e3, "parameters": {}},
+        Limit("thrust_loss", 31.0, {}, actuator="port"),
+        Limit("clock_offset", 0.5, {}, channel="wind"),
+        Limit("fouling", 1e3, {}),
     ]
-    found = verdict.not_shown(limits)
-    assert found == {"causes": 2, "of": 3, "names": ["thrust_loss (port)", "fouling"]}
-    rows = page._limits(SimpleNamespace(limits=limits))
-    assert sum("not detectable" in row for row in rows) == 2
+    assert smallest.not_shown(limits) == NotShown(2, 3, ("thrust_loss (port)", "fouling"))
+    rows = table_of(smallest.markdown(limits)).rows
+    assert [row[2] for row in rows] == ["not detectable", "50%", "not detectable"]

@@ -1,21 +1,26 @@
 """The pages of formats name every word that a machine may read."""
 
 import re
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
 
+from pipelines.experiments import verdict_reference
 from shiplog.logs.conversion.write import LOG_CONTRACT, SCHEMAS
-from shiplog.logs.health.health_report import CONTRACT, FINDING_KINDS, Instrument, VoyageReport
+from shiplog.logs.health.health_report import FINDING_KINDS, Instrument, VoyageReport
 from shiplog.models.causes.user import ANSWERS
 from shiplog.nomenclature.channels import UNUSABLE, Quality
-from shiplog.report.diagnosis.verdict import DEPENDS, Verdict
+from shiplog.nomenclature.contract import CONTRACT
+from shiplog.report.diagnosis.sections.structure import DEPENDS
+from shiplog.report.diagnosis.verdict import Verdict
 
 PAGES = Path(__file__).parents[2] / "docs" / "reference"
 PAGE = "\n".join(
     (PAGES / f"{name}.md").read_text(encoding="utf-8")
     for name in ("formats", "streams", "findings", "answers")
 )
+ANSWERS_PAGE = (PAGES / "answers.md").read_text(encoding="utf-8")
 WORDS = set(re.findall(r"`([^`]+)`", PAGE))
 ROWS = {
     cells[0]: cells[1:]
@@ -35,9 +40,9 @@ def test_every_mark_of_a_row_has_its_bit(mark):
 def test_every_message_has_its_fields():
     by_message = {cells[1].strip("`"): cells[2] for cells in map(list, _rows_of("## Logs"))}
     assert by_message.keys() == SCHEMAS.keys()
-    for message, fields in SCHEMAS.items():
+    for message, keys in SCHEMAS.items():
         named = re.findall(r"`([a-z0-9_]+)`", by_message[message])
-        assert [name for name in named if name != "position_covariance"] == list(fields)
+        assert [name for name in named if name != "position_covariance"] == list(keys)
 
 
 def test_every_kind_of_finding_and_word_of_a_verdict_is_there():
@@ -52,6 +57,22 @@ def test_every_key_of_a_report_and_a_verdict_is_there():
     assert {*content, *content["messages"], *content["instruments"][0]} <= WORDS
     empty = Verdict("none", "", "run", True, "").as_json()
     assert {*empty, *empty["base"], "structure", "gain"} - {"contract"} <= WORDS
+
+
+def test_the_part_on_the_verdict_is_what_the_code_writes():
+    assert verdict_reference.page(ANSWERS_PAGE) == ANSWERS_PAGE, (
+        "python -m pipelines.experiments.verdict_reference --markdown docs/reference/answers.md"
+    )
+    empty = Verdict("none", "", "run", True, "").as_json()
+    written = {*empty, "structure", "gain", "recording"} - {"contract"}
+    assert written == verdict_reference.KEYS.keys()
+
+
+def test_what_a_docstring_says_of_a_field_is_said_of_one_that_there_is():
+    for of in verdict_reference.KEYS.values():
+        if isinstance(of, type):
+            named = verdict_reference.documented(of)[1]
+            assert named.keys() <= {one.name for one in fields(of)}, of
 
 
 def test_the_page_is_of_this_contract():

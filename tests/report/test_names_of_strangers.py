@@ -12,7 +12,7 @@ from shiplog.commands import api, diagnose
 from shiplog.diagnosis.residual.interval import Interval
 from shiplog.exceptions import StoreError
 from shiplog.logs.health.health_report import VoyageReport
-from shiplog.report.diagnosis.answer import DiagnosedTrial
+from shiplog.report.diagnosis.diagnosis import Diagnosis
 from shiplog.report.diagnosis.verdict import Verdict
 from shiplog.report.evaluation.text_table import inert, table
 from shiplog.report.viewer import album, diagnosis, report
@@ -58,14 +58,14 @@ def test_markdown_of_a_name_is_displayed_and_not_done(name):
 def test_the_report_of_a_diagnosis(tmp_path):
     intervals = (Interval(HTML, 100.0, 200.0, "external", f"pushed by {LINK}"),)
     verdict = Verdict("none", f"Nothing in {PICTURE}.", HTML, False, "", intervals=intervals)
-    diagnose._write(DiagnosedTrial(verdict, tmp_path))
+    diagnose._write(Diagnosis(verdict, tmp_path))
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
     assert "onerror" in text and "javascript" in text and harmless(text)
 
 
 def test_a_notebook():
     found = VoyageReport(HTML, 1, 0, 10, 1.0)
-    output = api.Ingested(Store("store"), [found], {})._repr_markdown_()
+    output = api.Ingested([found], store=Store("store"))._repr_markdown_()
     assert "onerror" in output and harmless(output)
 
 

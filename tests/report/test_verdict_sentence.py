@@ -1,34 +1,47 @@
 """Sentences of a verdict."""
 
+from dataclasses import replace
+
 from shiplog.diagnosis.verdict.result import EXPLAIN_MORE, PATTERN, REFUTED
+from shiplog.report.diagnosis.sections.causes import NamedCause
+from shiplog.report.diagnosis.sections.limits import NotShown
+from shiplog.report.diagnosis.sections.ranking import Ranked
+from shiplog.report.diagnosis.sections.structure import Structure
+from shiplog.report.diagnosis.sections.wrong import ChannelError
 from shiplog.report.diagnosis.verdict_sentence import sentence
 from shiplog.simulation.error_reduction import Gain
 
 
+def cause(
+    words: str, probability: float, name: str = "one", alike: tuple[str, ...] = ()
+) -> NamedCause:
+    return NamedCause(
+        name=name, probability=probability, sentence=words, equation="", parameters={},
+        indistinguishable_from=alike,
+    )  # fmt: skip
+
+
 def test_what_it_may_be_instead_is_in_the_sentence():
     """A name alone would say more than is known; and a gain below nothing is a loss."""
-    lag = {
-        "sentence": "The rudders lag.", "indistinguishable_from": ["rudder_delay"],
-        "probability": 0.9,
-    }  # fmt: skip
+    lag = cause("The rudders lag.", 0.9, alike=("rudder_delay",))
     output = sentence("named", [lag], None, Gain(500.0, 510.0, -0.05, 0.01, 18, {}), 1.0)
     assert output == (
         "No significant part of the error on 18 held-out windows is explained: it is 2.0% more "
         "(5.0% more to 1.0% less). The rudders lag; or it is rudder_delay: these data cannot tell."
     )
-    sure = lag | {"indistinguishable_from": []}
+    sure = replace(lag, indistinguishable_from=())
     gained = Gain(500.0, 400.0, 0.1, 0.3, 18, {})
     assert sentence("named", [sure], None, gained, 1.0) == (
         "20% of the error on 18 held-out windows is explained (10% to 30%). The rudders lag."
     )
     for probability, begins in ((0.53, "Likely (53%): "), (0.4, "Perhaps (40%): ")):
-        output = sentence("named", [sure | {"probability": probability}], None, gained, 1.0)
+        output = sentence("named", [replace(sure, probability=probability)], None, gained, 1.0)
         assert f"(10% to 30%). {begins}" in output and output.endswith("The rudders lag.")
 
 
 def test_an_error_that_does_not_change_is_said_to_stay_the_same():
     """A fault of a sensor that only tells positions changes no error of the velocities."""
-    late = {"sentence": "The position is late.", "indistinguishable_from": [], "probability": 1.0}
+    late = cause("The position is late.", 1.0)
     for low, begins in ((-0.0004, "The error on 12 held-out windows stays the same."),
                         (-0.0006, "No significant part of the error on 12")):  # fmt: skip
         same = Gain(500.0, 499.9, low, 0.0004, 12, {})
@@ -36,19 +49,16 @@ def test_an_error_that_does_not_change_is_said_to_stay_the_same():
 
 
 def test_one_window_is_one_window():
-    lag = {"sentence": "The rudders lag.", "indistinguishable_from": [], "probability": 0.9}
+    lag = cause("The rudders lag.", 0.9)
     for after, low, high in ((400.0, 0.1, 0.3), (500.0, -0.1, 0.1)):
         output = sentence("named", [lag], None, Gain(500.0, after, low, high, 1, {}), 1.0)
         assert "of the error on 1 held-out window is explained" in output
 
 
 def test_one_of_several_causes_that_acts_in_addition_is_in_the_sentence():
-    sure = {
-        "sentence": "The clock is late.", "name": "clock_offset", "probability": 1.0,
-        "indistinguishable_from": [],
-    }  # fmt: skip
-    ranking = [sure, {"name": "wind_force", "probability": 0.8},
-               {"name": "wind_speed_scale", "probability": 0.17}]  # fmt: skip
+    sure = cause("The clock is late.", 1.0, "clock_offset")
+    ranking = [Ranked("clock_offset", 1.0), Ranked("wind_force", 0.8),
+               Ranked("wind_speed_scale", 0.17)]  # fmt: skip
     gained = Gain(500.0, 300.0, 0.3, 0.5, 18, {})
     one_of = ("wind_force", "wind_speed_scale")
     assert sentence("named", [sure], None, gained, 1.0, ranking=ranking, one_of=one_of).endswith(
@@ -61,10 +71,10 @@ def test_one_of_several_causes_that_acts_in_addition_is_in_the_sentence():
 def test_the_largest_part_that_is_not_explained_is_in_the_sentence():
     """Of shares 0.6 and 0.3 before: nine tenths of the first are taken off, a third of the second,
     so that 0.06 and 0.2 are left."""
-    sure = {"sentence": "The rudders lag.", "indistinguishable_from": [], "probability": 1.0}
+    sure = cause("The rudders lag.", 1.0)
     gained = Gain(500.0, 200.0, 0.5, 0.7, 18, {"sway": 0.9, "yaw_rate": 1.0 / 3.0})
     wrong = [
-        {"channel": "sway", "share_of_error": 0.6}, {"channel": "yaw_rate", "share_of_error": 0.3},
+        ChannelError("sway", 0.6, ""), ChannelError("yaw_rate", 0.3, ""),
     ]  # fmt: skip
     assert sentence("named", [sure], None, gained, 1.0, wrong=wrong).endswith(
         "The rudders lag. The largest unexplained part is in yaw rate: 20% of the error."
@@ -72,7 +82,7 @@ def test_the_largest_part_that_is_not_explained_is_in_the_sentence():
 
 
 def test_the_gain_of_another_fit_alone_is_in_the_sentence():
-    sure = {"sentence": "The wind is late.", "indistinguishable_from": [], "probability": 1.0}
+    sure = cause("The wind is late.", 1.0)
     gained = Gain(500.0, 300.0, 0.3, 0.5, 18, {})
     assert sentence("named", [sure], None, gained, 1.0, 0.32).endswith(
         "(30% to 50%). The wind is late. Fitted again with nothing named, the model has an error "
@@ -88,11 +98,11 @@ def test_noise_of_rougher_weather_is_mentioned_where_nothing_changed():
 
 def test_an_undecided_verdict_does_not_contradict_its_ranking():
     """Either nothing is probable enough, or held-out voyages do not confirm what is."""
-    likely = [{"name": "fouling", "probability": 0.6}, {"name": "none", "probability": 0.3}]
+    likely = [Ranked("fouling", 0.6), Ranked("none", 0.3)]
     assert sentence("undecided", [], None, None, 1.0, ranking=likely) == (
         "Undecided: fouling (60%) or no change (30%). No answer has a probability of 90%."
     )
-    sure = [{"name": "rudder_delay", "probability": 0.99}, {"name": "none", "probability": 0.01}]
+    sure = [Ranked("rudder_delay", 0.99), Ranked("none", 0.01)]
     assert sentence("undecided", [], None, None, 1.0, ranking=sure) == (
         "Undecided: the log Bayes factor favours rudder delay (99%), which held-out voyages do not "
         "confirm."
@@ -101,18 +111,18 @@ def test_an_undecided_verdict_does_not_contradict_its_ranking():
 
 def test_what_is_not_stated_is_not_rounded_to_what_would_be():
     """0.897 is below 0.9, and 90 % of it would not be."""
-    near = [{"name": "fouling", "probability": 0.897}, {"name": "none", "probability": 0.1}]
+    near = [Ranked("fouling", 0.897), Ranked("none", 0.1)]
     assert sentence("undecided", [], None, None, 1.0, ranking=near) == (
         "Undecided: fouling (89%) or no change (10%). No answer has a probability of 90%."
     )
-    cause = {"sentence": "It is.", "indistinguishable_from": [], "probability": 0.897}
-    assert sentence("named", [cause], None, None, 1.0) == "Likely (89%): It is."
+    one = cause("It is.", 0.897)
+    assert sentence("named", [one], None, None, 1.0) == "Likely (89%): It is."
 
 
 def test_not_all_of_the_error_is_explained():
-    sure = {"sentence": "The rudders lag.", "indistinguishable_from": [], "probability": 1.0}
+    sure = cause("The rudders lag.", 1.0)
     gained = Gain(500.0, 2.0, 0.993, 0.9991, 18, {"sway": 0.997})
-    wrong = [{"channel": "sway", "share_of_error": 1.0}]
+    wrong = [ChannelError("sway", 1.0, "")]
     assert sentence("named", [sure], None, gained, 1.0, wrong=wrong) == (
         "99.6% of the error on 18 held-out windows is explained (99% to 99.9%). The rudders lag. "
         "The largest unexplained part is in sway: 0.3% of the error."
@@ -120,8 +130,8 @@ def test_not_all_of_the_error_is_explained():
 
 
 def test_a_cause_or_something_outside_the_catalogue_is_undecided():
-    ranking = [{"name": n, "probability": 0.5} for n in ("unknown:motion", "fouling")]
-    structure = {"family": "motion", "acts_on": ["surge"], "depends_on": []}
+    ranking = [Ranked(n, 0.5) for n in ("unknown:motion", "fouling")]
+    structure = Structure("motion", ("surge",), (), 0.0)
     assert sentence(
         "undecided",
         [],
@@ -139,8 +149,8 @@ def test_a_cause_or_something_outside_the_catalogue_is_undecided():
 
 
 def test_what_held_out_voyages_refute_leaves_both_open():
-    ranking = [{"name": n, "probability": 0.5} for n in ("unknown:motion", "payload")]
-    structure = {"family": "motion", "acts_on": ["surge"], "depends_on": []}
+    ranking = [Ranked(n, 0.5) for n in ("unknown:motion", "payload")]
+    structure = Structure("motion", ("surge",), (), 0.0)
     assert sentence(
         "undecided", [], structure, None, 1.0, ranking=ranking, either=("payload",), why=REFUTED
     ) == (
@@ -151,8 +161,8 @@ def test_what_held_out_voyages_refute_leaves_both_open():
 
 
 def test_a_force_of_unclear_pattern_may_be_a_thruster():
-    ranking = [{"name": n, "probability": 0.5} for n in ("side_thrust", "unknown:intermittent")]
-    structure = {"family": "intermittent", "acts_on": ["sway"], "depends_on": []}
+    ranking = [Ranked(n, 0.5) for n in ("side_thrust", "unknown:intermittent")]
+    structure = Structure("intermittent", ("sway",), (), 0.0)
     assert sentence("undecided", [], structure, None, 1.0, ranking=ranking, why=PATTERN) == (
         "Undecided: side thrust (50%), or something outside the catalogue (intermittent) (50%). A "
         "side force comes and goes: less clearly on or off than one device is, and more clearly "
@@ -161,19 +171,19 @@ def test_a_force_of_unclear_pattern_may_be_a_thruster():
 
 
 def test_no_change_says_how_many_causes_could_not_have_shown():
-    names = ["fouling", "thrust_loss (port)", "payload"]
-    some = {"causes": 3, "of": 18, "names": names}
+    names = ("fouling", "thrust_loss (port)", "payload")
+    some = NotShown(3, 18, names)
     output = sentence("none", [], None, None, 1.0, hidden=some)
     assert output.startswith("No change found")
     assert output.endswith(
         "3 of 18 causes could not have shown: fouling, payload, thrust loss (port)."
     )
-    none = {"causes": 0, "of": 18, "names": []}
+    none = NotShown(0, 18, ())
     assert sentence("none", [], None, None, 1.0, hidden=none).endswith(
         "Each of 18 causes could have shown."
     )
-    ranking = [{"name": "none", "probability": 0.59}, {"name": "fouling", "probability": 0.06}]
+    ranking = [Ranked("none", 0.59), Ranked("fouling", 0.06)]
     output = sentence("undecided", [], None, None, 1.0, ranking=ranking, hidden=some)
     assert output.startswith("Undecided: no change (59%)") and "3 of 18 causes" in output
-    likely = [{"name": "fouling", "probability": 0.59}, {"name": "none", "probability": 0.3}]
+    likely = [Ranked("fouling", 0.59), Ranked("none", 0.3)]
     assert "could" not in sentence("undecided", [], None, None, 1.0, ranking=likely, hidden=some)

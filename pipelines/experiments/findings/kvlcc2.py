@@ -50,7 +50,7 @@ def kvlcc2(folder: Path, out: Path) -> str:
     reversed_ = [n for n in there if n.startswith(REVERSED)]
     return "\n\n".join(
         (
-            evaluate_runs([run], store, marin).text(),
+            evaluate_runs([run], store, marin).text,
             diagnosed(run, store, marin, out / "kvlcc2-marin", "MARIN"),
             diagnosed(run, store, reversed_, out / "kvlcc2-reversed", "rudder reversed"),
         )

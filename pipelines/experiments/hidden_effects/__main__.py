@@ -25,8 +25,6 @@ python -m pipelines.experiments.hidden_effects score DIR
     the tables again, of what is there by now
 python -m pipelines.experiments.hidden_effects scores DIR [DIR ...] [--markdown PATH]
     the pages of validation: goals, misses, the scores of all methods, home and abroad apart
-python -m pipelines.experiments.hidden_effects compare FORMER PRESENT [--markdown PATH]
-    two programs on the cases that both answered; each the folder of one test, or a packed file
 python -m pipelines.experiments.hidden_effects pack DIR [DIR ...] --into FILE.tar.xz
     their answers and keys in one file, which `scores` takes as well as folders; unpacked with
     `tar -xf`, a test goes on where it was
@@ -54,7 +52,6 @@ from pipelines.experiments.hidden_effects import (
     score,
     score_tables,
     suites,
-    two_programs,
     validation,
 )
 from pipelines.experiments.hidden_effects.run import Settings
@@ -69,8 +66,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if given.what == "scores":
             return _scores(given)
-        if given.what == "compare":
-            return _compare(given)
         if given.what == "pack":
             print(archive.pack(given.out, given.into))
             return 0
@@ -108,17 +103,6 @@ def _scores(given: argparse.Namespace) -> int:
         print(page.text)
     else:
         page.write(given.markdown)
-    return 0
-
-
-def _compare(given: argparse.Namespace) -> int:
-    with archive.opened([given.former]) as former, archive.opened([given.present]) as present:
-        sides = [[score.read(folder) for folder in folders] for folders in (former, present)]
-        text = two_programs.page(*sides)
-    if given.markdown is None:
-        print(text)
-    else:
-        given.markdown.write_text(text + "\n", encoding="utf-8")
     return 0
 
 
@@ -178,16 +162,10 @@ def _parser() -> argparse.ArgumentParser:
     page.add_argument(
         "--markdown", type=Path, metavar="PATH", help="write it there, with its picture"
     )
-    both = commands.add_parser("compare", help="two programs on the same cases")
-    both.add_argument("former", type=Path)
-    both.add_argument("present", type=Path)
-    both.add_argument("--markdown", type=Path, metavar="PATH")
     packed = commands.add_parser("pack", help="answers and keys in one file")
     packed.add_argument("out", type=Path, nargs="+", metavar="DIR")
     packed.add_argument("--into", type=Path, required=True, metavar="FILE.tar.xz")
-    for one in (
-        one for n, one in commands.choices.items() if n not in ("scores", "compare", "pack")
-    ):
+    for one in (one for n, one in commands.choices.items() if n not in ("scores", "pack")):
         one.add_argument("--least", type=int, default=0, metavar="N", help="exit code 4 unless N "
                          "are right and none is misnamed")  # fmt: skip
     return parser

@@ -6,11 +6,11 @@ Written by `python -m pipelines.experiments.hidden_effects.without --page`.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from pipelines.experiments.hidden_effects import goals, score, score_tables
 from pipelines.experiments.hidden_effects.score import Answer
-from pipelines.experiments.hidden_effects.two_programs import Pair
 from pipelines.experiments.hidden_effects.validation import heading, one_program
 from shiplog.exceptions import ShiplogError
 from shiplog.nomenclature.numbers import counted
@@ -60,6 +60,23 @@ MEANING = {
 }
 
 
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """One case with all parts of the decision, and without one of them."""
+
+    whole: Answer
+    without: Answer
+
+    @property
+    def differ(self) -> bool:
+        return _answer(self.whole) != _answer(self.without)
+
+
+def _answer(answer: Answer) -> tuple[str, frozenset[str], str | None]:
+    family = answer.family if answer.word == "unknown" else None
+    return answer.word, frozenset(answer.named), family
+
+
 def answers_in(folder: Path) -> dict[str, tuple[Answer, ...]]:
     """Part → the answers without it that an ablation has left there. Raises ShiplogError where
     there are none of the decision as it is."""
@@ -98,8 +115,8 @@ def page(tests: Sequence[Mapping[str, Sequence[Answer]]]) -> str:
 def _counts(pairs: Mapping[str, Sequence[Pair]]) -> str:
     rows = [
         (
-            part, MEANING[part], len(given), sum(pair.present.right for pair in given),
-            sum(pair.present.misnamed for pair in given), sum(pair.differ for pair in given),
+            part, MEANING[part], len(given), sum(pair.without.right for pair in given),
+            sum(pair.without.misnamed for pair in given), sum(pair.differ for pair in given),
         )
         for part, given in pairs.items()
     ]  # fmt: skip
@@ -111,8 +128,8 @@ def _counts(pairs: Mapping[str, Sequence[Pair]]) -> str:
 def _changes(pairs: Mapping[str, Sequence[Pair]]) -> str:
     rows = [
         (
-            part, pair.present.planned.label, score_tables.hidden(pair.present),
-            score_tables.marked(pair.former), score_tables.marked(pair.present),
+            part, pair.without.planned.label, score_tables.hidden(pair.without),
+            score_tables.marked(pair.whole), score_tables.marked(pair.without),
         )
         for part, given in pairs.items() for pair in given if pair.differ
     ]  # fmt: skip

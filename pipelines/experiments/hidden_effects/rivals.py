@@ -23,7 +23,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import jax
 import numpy as np
 from scipy.special import chdtri  # scipy.stats takes a second to load
 
@@ -39,6 +38,7 @@ from shiplog.diagnosis.trial.fitted import Point
 from shiplog.diagnosis.trial.setup import trial_of
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.exceptions import RunError, ShiplogError
+from shiplog.machine.jit_cache import traced
 from shiplog.training.runs import load_model
 from shiplog.voyages.rows import recording
 from shiplog.voyages.rows.recording import Record
@@ -148,7 +148,7 @@ def beyond(model, theta: np.ndarray, y: np.ndarray, driven: np.ndarray) -> np.nd
     return measured - (0.25 * of_model[:, 2:] + 0.5 * of_model[:, 1:-1] + 0.25 * of_model[:, :-2])
 
 
-@jax.jit
+@traced
 def _accelerations(model, theta, y, driven):
     return model.acceleration(theta, y, driven[..., :-2], driven[..., -2:])
 

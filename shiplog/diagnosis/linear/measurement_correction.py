@@ -10,6 +10,7 @@ import numpy as np
 from shiplog.diagnosis.linear import segments
 from shiplog.diagnosis.linear.parameter_layout import Columns
 from shiplog.diagnosis.linear.segments import Cut
+from shiplog.machine.jit_cache import double
 from shiplog.models.causes import Cause, Setting
 from shiplog.models.extended import Extended
 from shiplog.voyages.rows.recording import Record
@@ -46,8 +47,9 @@ def water(causes: Sequence[Cause], numbers: Mapping[str, np.ndarray]) -> np.ndar
     for cause in causes:
         if (values := numbers.get(cause.label)) is None:
             continue
-        if (moving := cause.water(np.asarray(values))) is not None:
-            found += np.asarray(moving, dtype=float)
+        with double():
+            if (moving := cause.water(np.asarray(values))) is not None:
+                found += np.asarray(moving, dtype=float)
     return found
 
 

@@ -18,6 +18,7 @@ from shiplog.diagnosis.linear import segment_nodes
 from shiplog.diagnosis.linear.segment_nodes import Knots
 from shiplog.diagnosis.linear.segments import Cut, SegmentGrid
 from shiplog.diagnosis.noise.likelihood import Modes
+from shiplog.machine.jit_cache import double
 from shiplog.models.compiled_network import Network
 
 INPUT_SIZES = (1.0, 3.0, 9.0, 27.0)  # of the accelerations, in units of the ordinary process noise
@@ -78,7 +79,8 @@ def of(
 def _features(network: Network, knots: Knots) -> np.ndarray:
     """[S, J, F]"""
     actuator, wind = knots.driven[..., :-3], knots.driven[..., -2:]
-    return np.asarray(network.features(*map(jnp.asarray, (knots.state, actuator, wind))))
+    with double():
+        return np.asarray(network.features(*map(jnp.asarray, (knots.state, actuator, wind))))
 
 
 def _likelihood(total: np.ndarray, known: np.ndarray, size: float) -> float:

@@ -31,6 +31,7 @@ from shiplog.diagnosis.nominal.campaign_prior import prior
 from shiplog.diagnosis.nominal.nominal_fit import Converged
 from shiplog.diagnosis.nominal.nominal_reference import Reference
 from shiplog.diagnosis.nominal.voyage_effects import VoyageEffects, reduced
+from shiplog.machine.jit_cache import double
 from shiplog.models.causes import Setting
 from shiplog.models.compiled_network import Network
 from shiplog.models.extended import Extended
@@ -168,7 +169,8 @@ def widened(model: Extended, setting: Setting, start: Start) -> Start:
         if not cause.absorbed:
             continue
         for size in np.diag(cause.sizes(setting)):
-            changed = cause.coefficients(dict(values), size, still, 0.5, {})
+            with double():
+                changed = cause.coefficients(dict(values), size, still, 0.5, {})
             for i, name in enumerate(names):
                 more = abs(float(changed.get(name, values[name])) - values[name])
                 spread[i] = max(spread[i], more)

@@ -7,7 +7,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Interval:
-    """An interval that the verdict lists by itself: external, gap or coverage."""
+    """Stretches of the trial that were left out, or are outside the training data.
+
+    start_s   from the voyage's first row, s
+    kind      `external` or `coverage`
+    """
 
     voyage: str
     start_s: float

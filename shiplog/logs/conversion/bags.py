@@ -18,6 +18,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 
 from shiplog.exceptions import LogUnreadable, ShiplogError, listed
 from shiplog.logs.conversion import ros2_bags
+from shiplog.logs.conversion.original import Format, Original
 from shiplog.logs.conversion.ros2_bags import MCAP, SQLITE, Line, is_ros2_bag
 from shiplog.logs.conversion.write import CHUNK_BYTES, LOG_CONTRACT
 from shiplog.machine import files
@@ -197,6 +198,17 @@ class _Log:
         fit = [f"{topic}: {n} of its messages do not fit their definition"
                for topic, n in self._bad.items()]  # fmt: skip
         self.lost = [said for said in self.lost if said not in damage] + fit + damage
+
+
+def _logs(original: Original) -> Iterator[Path]:
+    target = original.place()
+    if lost := bag_to_log(original.path, target, original.ship):
+        original.lost[str(original.given)] = "; ".join(lost)
+    log.info("%s written", target.name)
+    yield target
+
+
+FORMAT = Format("ROS bags", is_bag, _logs)
 
 
 @contextmanager

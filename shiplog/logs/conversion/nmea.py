@@ -10,7 +10,7 @@ import heapq
 import logging
 from array import array
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import date
 from pathlib import Path
@@ -33,8 +33,10 @@ from shiplog.logs.conversion.nmea_lines import (
 from shiplog.logs.conversion.nmea_sentences import SENTENCES, TIME_AT
 from shiplog.logs.conversion.nmea_topics import Gathered, Rows, Spoken, topics_of
 from shiplog.logs.conversion.nmea_utc import Resolved, Times, kept, resolve
+from shiplog.logs.conversion.original import Format, Original
 from shiplog.logs.conversion.write import Series
 from shiplog.logs.health.health_report import Finding
+from shiplog.nomenclature.numbers import counted
 from shiplog.nomenclature.units import SECOND_NS
 
 log = logging.getLogger(__name__)
@@ -108,6 +110,23 @@ def read_sentences(lines: Iterable[str], name: str) -> NmeaLog:
         for sentence in read.of(line):
             reader.take(sentence)
     return reader.finish(name, [read])
+
+
+def text_to_logs(read: Callable[[Path], NmeaLog]) -> Callable[[Original], Iterator[Path]]:
+    """The one log of a text that `read` reads."""
+
+    def logs(original: Original) -> Iterator[Path]:
+        text = read(original.path)
+        if text.damaged:
+            original.lost[str(original.given)] = counted(text.damaged, "damaged sentence")
+        yield original.written(text.series, text.findings)
+
+    return logs
+
+
+FORMAT = Format(
+    "NMEA 0183 text", is_nmea, text_to_logs(lambda path: read_nmea_log([path], path.name))
+)
 
 
 def _text(path: Path) -> Iterator[str]:

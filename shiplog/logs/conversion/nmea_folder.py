@@ -6,20 +6,22 @@ has its clock from the others. A text without stamps stands for itself.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from shiplog.exceptions import ChannelMissing, ShiplogError
-from shiplog.logs.conversion.columns import named_apart
+from shiplog.logs.conversion.columns import dropped, named_apart
 from shiplog.logs.conversion.nmea import NmeaLog, is_nmea, read_nmea_log
 from shiplog.logs.conversion.nmea_lines import SENTENCE, Stamps
 from shiplog.logs.conversion.nmea_receivers import fills
-from shiplog.logs.conversion.topics import folder_to_series
+from shiplog.logs.conversion.original import Format, Original
+from shiplog.logs.conversion.topics import folder_to_series, holds_tables
 from shiplog.logs.conversion.write import Series
 from shiplog.logs.health.health_report import Finding
+from shiplog.nomenclature.numbers import counted
 from shiplog.ship_profile.profile import Column, Profile
 
 LOOKED_AT = 50  # lines of a text, that say whether it has stamps
@@ -64,6 +66,20 @@ def read_folder(
         )
     done.series = named_apart(done.series)
     return done
+
+
+def _logs(original: Original) -> Iterator[Path]:
+    folder = read_folder(original.path, original.profile, original.times)
+    lost = [counted(folder.damaged, "damaged sentence") + "."] if folder.damaged else []
+    if lost := [*lost, *folder.left_out]:
+        original.lost[str(original.given)] = " ".join(lost)
+    yield original.written(folder.series, [*folder.findings, *dropped(folder.left_out)])
+
+
+FORMAT = Format(
+    "folders of one of them per topic or instrument", Path.is_dir, _logs,
+    sure=lambda path, profile: holds_tables(path) or any(map(is_nmea, path.glob("[!.]*"))),
+)  # fmt: skip
 
 
 def _add(done: FolderLog, found: NmeaLog) -> None:

@@ -16,8 +16,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from shiplog.exceptions import ChannelMissing, listed
-from shiplog.logs.conversion.nmea import NmeaLog, read_sentences
+from shiplog.logs.conversion.nmea import NmeaLog, read_sentences, text_to_logs
 from shiplog.logs.conversion.nmea_lines import Stamps
+from shiplog.logs.conversion.original import Format
 from shiplog.logs.conversion.signalk_topics import PREFIXES, Values, topics_of, unread
 from shiplog.logs.conversion.write import Series
 from shiplog.logs.health.health_report import Finding
@@ -132,6 +133,9 @@ def read_signalk(path: Path) -> NmeaLog:
     for finding in findings[len(nmea.findings) :]:
         log.warning("%s: %s", path.name, finding.sentence)
     return NmeaLog(nmea.series, nmea.damaged + deltas.damaged, findings)
+
+
+FORMAT = Format("Signal K logs", is_signalk, text_to_logs(read_signalk))
 
 
 def _source(update: dict) -> str:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
 
-CONTRACT = 1
-
 
 @dataclass(frozen=True, slots=True)
 class Finding:
@@ -123,9 +121,9 @@ class VoyageReport:
         return cls(
             content["name"], counts["read"], counts["lost"], content["rows"], content["seconds"],
             tuple(Finding(**finding) for finding in content["findings"]),
-            content.get("usable_s"), content.get("windows"),
-            tuple(Instrument(**one) for one in content.get("instruments", ())),
-            tuple(NotCompared(**one) for one in content.get("not_compared", ())),
+            content["usable_s"], content["windows"],
+            tuple(Instrument(**one) for one in content["instruments"]),
+            tuple(NotCompared(**one) for one in content["not_compared"]),
         )  # fmt: skip
 
     def as_json(self) -> dict:

@@ -299,9 +299,8 @@ class Bank(Cause):
         to = a + jnp.clip(part, 0.0, 1.0)[..., None] * along - here
         distance = jnp.sqrt((to**2).sum(-1) + 1e-6)
         gap = jnp.maximum(distance - 0.5 * breadth, 0.0)
-        one = jnp.ones((len(lines), len(lines)))  # as a run has it that was extended before
         reach, lever = 3.0 * length * jnp.exp(p[1]), 0.25 * length * jnp.exp(p[2])
-        near = _nearest(distance, at.get("bank.same", one)) / (1.0 + (gap / reach) ** 3)
+        near = _nearest(distance, at["bank.same"]) / (1.0 + (gap / reach) ** 3)
         c, s = jnp.cos(state[..., 4])[..., None], jnp.sin(state[..., 4])[..., None]
         ahead = (c * to[..., 0] + s * to[..., 1]) / distance
         starboard = (c * to[..., 1] - s * to[..., 0]) / distance

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from shiplog.exceptions import RunError
+from shiplog.machine.jit_cache import double
 from shiplog.machine.paths import check_causes
 from shiplog.models.causes import CATALOGUE, Cause
 
@@ -42,7 +43,8 @@ def _of(path: Path) -> list[Cause]:
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:
-        spec.loader.exec_module(module)
+        with double():  # constants of JAX, too
+            spec.loader.exec_module(module)
     except Exception as error:  # whatever a user's own code may raise
         raise RunError(
             f"{path} cannot be run: {type(error).__name__}: {error}.", hint="mend it first."

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from shiplog.machine import jit_cache  # noqa: F401  # for its effect: JAX in double precision
 from shiplog.models.coefficients import Parameters
 from shiplog.models.mmg.geometry import PARTS, Geometry, geometry_of
 from shiplog.models.mmg.model import MMG

@@ -10,7 +10,6 @@ from pathlib import Path
 from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.hypotheses import intermittent
 from shiplog.diagnosis.linear import segments
-from shiplog.diagnosis.linear.linear_segments import Linear
 from shiplog.diagnosis.residual import next_manoeuvre
 from shiplog.diagnosis.residual.interval import Interval
 from shiplog.diagnosis.residual.omitted_inputs import Dependence
@@ -20,13 +19,18 @@ from shiplog.diagnosis.verdict.held_out import HeldOut
 from shiplog.diagnosis.verdict.result import Decision
 from shiplog.exceptions import listed
 from shiplog.models.causes import CATALOGUE, Cause
-from shiplog.report.diagnosis import verdict as verdicts
+from shiplog.report.diagnosis.sections import causes as named_causes
+from shiplog.report.diagnosis.sections import contradictions as contradicting
+from shiplog.report.diagnosis.sections import limits as smallest
+from shiplog.report.diagnosis.sections import ranking as rankings
+from shiplog.report.diagnosis.sections import reasons, traces, unseen, wrong
+from shiplog.report.diagnosis.sections import structure as structures
+from shiplog.report.diagnosis.sections.structure import Structure
 from shiplog.report.diagnosis.verdict import Verdict
 from shiplog.report.diagnosis.verdict_sentence import less, sentence
 from shiplog.ship_profile import differences as profile_differences
 from shiplog.ship_profile.profile import Profile
 from shiplog.simulation.error_reduction import Gain
-from shiplog.simulation.extended_simulator import ExtendedSimulator
 from shiplog.training.runs.load_model import Run
 from shiplog.voyages.rows import timescale
 from shiplog.voyages.rows.recording import Record
@@ -35,39 +39,11 @@ from shiplog.voyages.store import parts
 from shiplog.voyages.store.contradicted import Contradicted
 
 OTHERWISE = "the profile reads these logs otherwise than those of the model"
-RECORDING = "diagnosis.rrd"  # in the folder of a diagnosis
 FEWEST_SEGMENTS = 4  # that a verdict needs
 # Families in which a model errs outside its training data; such an error resembles noise, too.
 INPUTS = ("wind", "motion", "controls", "stochastic")
 OPEN = ("unknown", "undecided")  # what may be such an error
 LEAST_CANDIDATE = 0.1  # probability of an answer that is worth a test of its own
-
-
-@dataclass(frozen=True)
-class DiagnosedTrial:
-    """The verdict and the objects behind it.
-
-    simulated  trial and decision of the simulated model; of a network, not those of its MMG
-    whole   that trial, linearised on overlapping segments
-    held    the held-out windows; None where no stretch is long enough for one
-    after   the extended model; None without a named cause
-    drawn   whether the pictures could be drawn
-    """
-
-    verdict: Verdict
-    folder: Path
-    decision: Decision | None = None
-    trial: Trial | None = None
-    simulated: tuple[Trial, Decision] | None = None
-    whole: Linear | None = None
-    held: HeldOut | None = None
-    after: ExtendedSimulator | None = None
-    drawn: bool = True
-
-    @property
-    def recording(self) -> Path | None:
-        """Path of the Rerun recording; None where nothing was compared, or could be drawn."""
-        return self.folder / RECORDING if self.decision is not None and self.drawn else None
 
 
 @dataclass(frozen=True)
@@ -119,26 +95,27 @@ def verdict(
         notes.append(f"Windows in which the model diverges, in none of the figures: {number}.")
     named = {n.cause.label for n in decision.named}
     rejected = {k: why for k, why in rejected.items() if k not in named}
-    unavailable = verdicts.rejected_json(context.untested)
+    unavailable = reasons.of(context.untested)
     advised = next_manoeuvre.advice(trial, decision.named, decision.nothing.point.numbers)
-    causes = [verdicts.cause_json(n, advised.get(n.cause.label)) for n in decision.named]
+    causes = [named_causes.of_named(n, advised.get(n.cause.label)) for n in decision.named]
     if decision.side_force is not None:
         times = intermittent.active_intervals(trial, decision.fit, decision.side_force)
-        causes.append(verdicts.side_force_json(decision, times))
+        causes.append(named_causes.of_side_force(decision, times))
     word = _word(decision, bool(causes), held, context)
     if context.against and word in ("unknown", "coverage"):
         word = "undecided"
-    structure = verdicts.structure_json(decision, context.run.profile.actuator_names)
-    ranking = verdicts.probabilities_json(decision.ranking)
+    structure = structures.of(decision, context.run.profile.actuator_names)
+    ranking = rankings.of(decision.ranking)
     setting, catalogue = trial.reference.setting, trial.reference.model.causes
-    limits = verdicts.limits_json(decision, catalogue, setting)
-    hidden = verdicts.not_shown(limits)
+    limits = smallest.of(decision, catalogue, setting)
+    hidden = smallest.not_shown(limits)
+    errors = wrong.of(context.wrong)
     text = f"{none_named(context.lost)}."
     if not context.lost:
         text = sentence(
             word, causes, structure, found, decision.fit.noise_factor, context.alone,
-            ranking, context.wrong, decision.one_of, decision.either, decision.why,
-            hidden,
+            ranking=ranking, wrong=errors, one_of=decision.one_of, either=decision.either,
+            why=decision.why, hidden=hidden,
         )  # fmt: skip
     if context.against:  # first, whatever is said of the rest
         open_ = "No cause explains the rest." if word == "undecided" else text
@@ -153,17 +130,17 @@ def verdict(
         made=made_of(context.run, trial.record),
         causes=tuple(causes),
         ranking=ranking,
-        rejected=verdicts.rejected_json(rejected),
-        traces=tuple(verdicts.trace_json(n) for n in decision.traces),
+        rejected=reasons.of(rejected),
+        traces=traces.of(decision.traces),
         structure=structure if word == "unknown" else None,
         intervals=(*context.external, *context.uncovered),
         gain=found if causes else None,
         without="" if held is None else held.left_out,
-        wrong=tuple(context.wrong),
-        unseen=tuple(verdicts.unseen_json(row) for row in context.unseen),
+        wrong=errors,
+        unseen=tuple(map(unseen.of, context.unseen)),
         limits=limits,
         hidden=hidden,
-        contradictions=tuple(one.as_json() for one in context.against),
+        contradictions=contradicting.of(context.against),
         unavailable=unavailable,
         notes=tuple(notes),
     )
@@ -290,8 +267,7 @@ def contradicted(
     why = contradicted_causes.every(contradictions.channels(found), run.profile)
     return Verdict(
         "undecided", sentence, run.name, before_effect, made_of(run, recorded),
-        unavailable=verdicts.rejected_json(why),
-        contradictions=tuple(one.as_json() for one in found),
+        unavailable=reasons.of(why), contradictions=contradicting.of(found),
     )  # fmt: skip
 
 
@@ -305,16 +281,15 @@ def other_convention(
     why   as `sign_conventions.at_once` has it
     """
     said = f"{contradictions.text(found)} {none_named(why)}.".strip()
-    structure = {"family": "motion", "acts_on": [], "depends_on": list(verdicts.DEPENDS["motion"]),
-                 "evidence_nats": 0.0}  # fmt: skip
+    structure = Structure("motion", (), structures.DEPENDS["motion"], 0.0)
     note = (
         "No search for causes was made: correct the profile of these logs, ingest them again, and "
         "diagnose again."
     )
     return Verdict(
         "unknown", said, run.name, before_effect, made_of(run, recorded), structure=structure,
-        unavailable=verdicts.rejected_json({c.name: OTHERWISE for c in CATALOGUE}),
-        notes=(*notes, note), contradictions=tuple(one.as_json() for one in found),
+        unavailable=reasons.of({c.name: OTHERWISE for c in CATALOGUE}),
+        notes=(*notes, note), contradictions=contradicting.of(found),
     )  # fmt: skip
 
 

@@ -19,7 +19,7 @@ from shiplog.exceptions import listed
 from shiplog.nomenclature.channels import STATE, VELOCITY
 from shiplog.report import viewer
 from shiplog.report.diagnosis import page
-from shiplog.report.diagnosis.answer import DiagnosedTrial
+from shiplog.report.diagnosis.diagnosis import Diagnosis
 from shiplog.report.viewer.diagnosis_data import AFTER, BEFORE, ERROR_COLUMNS, TRACKS, Exhibit
 from shiplog.voyages.rows.recording import Record
 from shiplog.voyages.windows.windows import Windows
@@ -27,12 +27,12 @@ from shiplog.voyages.windows.windows import Windows
 NOT_DRAWN = 1e6  # m, m/s: a rollout beyond has left the pond, and is not drawn
 
 
-def save(done: DiagnosedTrial, path: Path) -> None:
+def save(done: Diagnosis, path: Path) -> None:
     """The recording of a diagnosis that came to a decision."""
     viewer.save_diagnosis(exhibit(done), path)
 
 
-def exhibit(done: DiagnosedTrial) -> Exhibit:
+def exhibit(done: Diagnosis) -> Exhibit:
     """Of a diagnosis that came to a decision."""
     trial, decision = done.trial, done.decision
     assert trial is not None and decision is not None
@@ -66,7 +66,7 @@ def _measured(record: Record) -> pl.DataFrame:
 # --- forces ---------------------------------------------------------------------------------------
 
 
-def _residual(done: DiagnosedTrial) -> tuple[pl.DataFrame, tuple[str, ...]]:
+def _residual(done: Diagnosis) -> tuple[pl.DataFrame, tuple[str, ...]]:
     """Unexplained and named force at the knots, and what the latter is of."""
     assert done.simulated is not None and done.whole is not None
     (trial, decision), whole = done.simulated, done.whole
@@ -139,7 +139,7 @@ def _side_force(trial: Trial, decision: Decision) -> np.ndarray:
 # --- windows --------------------------------------------------------------------------------------
 
 
-def _before_and_after(done: DiagnosedTrial) -> tuple[pl.DataFrame, pl.DataFrame]:
+def _before_and_after(done: Diagnosis) -> tuple[pl.DataFrame, pl.DataFrame]:
     """Tracks and errors of every window; after, by numbers that were fitted without its voyage."""
     held, decision = done.held, done.decision
     if held is None or decision is None:

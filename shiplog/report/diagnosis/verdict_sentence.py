@@ -9,6 +9,11 @@ from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.verdict.result import EXPLAIN_MORE, PATTERN, REFUTED, SIDE_THRUST
 from shiplog.exceptions import listed
 from shiplog.nomenclature.numbers import counted, percent
+from shiplog.report.diagnosis.sections.causes import NamedCause
+from shiplog.report.diagnosis.sections.limits import NONE_TESTED, NotShown
+from shiplog.report.diagnosis.sections.ranking import Ranked
+from shiplog.report.diagnosis.sections.structure import Structure
+from shiplog.report.diagnosis.sections.wrong import ChannelError
 from shiplog.simulation.error_reduction import Gain
 
 NOTED_NOISE = 1.15  # times the nominal process noise, from which "no change" mentions it
@@ -21,17 +26,17 @@ OTHER_EQUATIONS = (
 
 def sentence(
     verdict: str,
-    causes: Sequence[dict],
-    structure: dict | None,
+    causes: Sequence[NamedCause],
+    structure: Structure | None,
     gain: Gain | None,
     noise_factor: float,
     alone: float | None = None,
-    ranking: Sequence[dict] = (),
-    wrong: Sequence[dict] = (),
+    ranking: Sequence[Ranked] = (),
+    wrong: Sequence[ChannelError] = (),
     one_of: Sequence[str] = (),
     either: Sequence[str] = (),
     why: str = "",
-    hidden: dict | None = None,
+    hidden: NotShown = NONE_TESTED,
 ) -> str:
     """The verdict in a few sentences: the share of the error that is explained, then the causes.
 
@@ -41,7 +46,7 @@ def sentence(
     one_of  names of which one acts in addition
     either  names that act, or else the structure does
     why     an undecided verdict is, as of `Decision`
-    hidden  how many causes could not have shown, as of `verdict.not_shown`
+    hidden  how many causes could not have shown, as of `limits.not_shown`
     """
     if verdict == "named":
         named = _named(causes, gain, alone, wrong)
@@ -50,10 +55,9 @@ def sentence(
         assert structure is not None
         return _either(either or (SIDE_THRUST,), structure, ranking, why)
     if verdict == "undecided":
-        stated = [one for one in ranking if one["probability"] >= thresholds.STATED]
+        stated = [one for one in ranking if one.probability >= thresholds.STATED]
         text = [
-            f"{_answer(one['name'])} ({_likelihood(one['probability'])})"
-            for one in stated or ranking[:3]
+            f"{_answer(one.name)} ({_likelihood(one.probability)})" for one in stated or ranking[:3]
         ]
         if stated:
             return (
@@ -62,7 +66,7 @@ def sentence(
             )
         least = f"{thresholds.STATED:.0%}"
         undecided = f"Undecided: {' or '.join(text)}. No answer has a probability of {least}."
-        first = ranking[0]["name"] if ranking else ""
+        first = ranking[0].name if ranking else ""
         return f"{undecided} {_hidden(hidden)}".strip() if first == "none" else undecided
     if verdict == "unknown":
         assert structure is not None
@@ -83,18 +87,21 @@ def sentence(
     )
 
 
-def _hidden(hidden: dict | None) -> str:
+def _hidden(hidden: NotShown) -> str:
     """How many causes no change can be said of, and which."""
-    if not hidden or not hidden["of"]:
+    if not hidden.of:
         return ""
-    if not hidden["causes"]:
-        return f"Each of {hidden['of']} causes could have shown."
-    which = listed((name.replace("_", " ") for name in hidden["names"]), most=MOST_HIDDEN)
-    return f"{hidden['causes']} of {hidden['of']} causes could not have shown: {which}."
+    if not hidden.causes:
+        return f"Each of {hidden.of} causes could have shown."
+    which = listed((name.replace("_", " ") for name in hidden.names), most=MOST_HIDDEN)
+    return f"{hidden.causes} of {hidden.of} causes could not have shown: {which}."
 
 
 def _named(
-    causes: Sequence[dict], gain: Gain | None, alone: float | None, wrong: Sequence[dict]
+    causes: Sequence[NamedCause],
+    gain: Gain | None,
+    alone: float | None,
+    wrong: Sequence[ChannelError],
 ) -> str:
     text = " ".join(_likely(cause) for cause in causes)
     if gain is None:
@@ -118,10 +125,10 @@ def _named(
     return f"{text} Fitted again with nothing named, the model has an error {less(alone)}."
 
 
-def _either(names: Sequence[str], structure: dict, ranking: Sequence[dict], why: str) -> str:
+def _either(names: Sequence[str], structure: Structure, ranking: Sequence[Ranked], why: str) -> str:
     """Causes, or something that is not in the catalogue and does much of the same."""
-    likely = {one["name"]: one["probability"] for one in ranking}
-    outside = f"unknown:{structure['family']}"
+    likely = {one.name: one.probability for one in ranking}
+    outside = f"unknown:{structure.family}"
     causes = listed(map(_answer, names))
     reasons = {
         EXPLAIN_MORE: f"Both together explain most, and alone {causes} more. {OTHER_EQUATIONS}",
@@ -141,36 +148,36 @@ def _either(names: Sequence[str], structure: dict, ranking: Sequence[dict], why:
     )
 
 
-def _in_addition(one_of: Sequence[str], ranking: Sequence[dict]) -> str:
+def _in_addition(one_of: Sequence[str], ranking: Sequence[Ranked]) -> str:
     """One cause more, of which only these are left."""
     if not one_of:
         return ""
-    likely = {one["name"]: one["probability"] for one in ranking}
+    likely = {one.name: one.probability for one in ranking}
     text = " or ".join(f"{_answer(name)} ({_likelihood(likely.get(name, 0.0))})" for name in one_of)
     return f"By the log Bayes factor, {text} acts as well: these data cannot tell which."
 
 
-def _unknown(structure: dict, noise_factor: float) -> str:
-    if structure["family"] == "intermittent":
+def _unknown(structure: Structure, noise_factor: float) -> str:
+    if structure.family == "intermittent":
         return (
             "Outside the catalogue: an intermittent side force acts on the ship, and no device "
             "of known place and pattern explains it."
         )
-    if structure["family"] == "stochastic":
+    if structure.family == "stochastic":
         return (
             f"Outside the catalogue: process noise is {noise_factor:.1f} times its nominal "
             "standard deviation, and no cause explains that."
         )
     return (
-        f"Outside the catalogue: it acts on {listed(structure['acts_on'])} and depends on "
-        f"{listed(structure['depends_on'])}."
+        f"Outside the catalogue: it acts on {listed(structure.acts_on)} and depends on "
+        f"{listed(structure.depends_on)}."
     )
 
 
-def _left(gain: Gain, wrong: Sequence[dict]) -> str:
+def _left(gain: Gain, wrong: Sequence[ChannelError]) -> str:
     """The channel with the largest part of the error that the causes leave; empty without one."""
     left = {
-        one["channel"]: one["share_of_error"] * (1.0 - gain.channels.get(one["channel"], 0.0))
+        one.channel: one.share_of_error * (1.0 - gain.channels.get(one.channel, 0.0))
         for one in wrong
     }
     if not left:
@@ -196,22 +203,20 @@ def _likelihood(probability: float) -> str:
     return f"{probability:.0%}"
 
 
-def _likely(cause: dict) -> str:
+def _likely(cause: NamedCause) -> str:
     """A cause's sentence, with its probability where that is below `thresholds.STATED`."""
-    if cause["probability"] >= thresholds.STATED:
+    if cause.probability >= thresholds.STATED:
         return _or(cause)
-    how = "Likely" if cause["probability"] > 0.5 else "Perhaps"
-    return f"{how} ({_likelihood(cause['probability'])}): {_or(cause)}"
+    how = "Likely" if cause.probability > 0.5 else "Perhaps"
+    return f"{how} ({_likelihood(cause.probability)}): {_or(cause)}"
 
 
-def _or(cause: dict) -> str:
+def _or(cause: NamedCause) -> str:
     """A cause's sentence, with the causes that these data cannot tell from it."""
-    others = cause["indistinguishable_from"]
+    others = cause.indistinguishable_from
     if not others:
-        return cause["sentence"]
-    return (
-        f"{cause['sentence'].removesuffix('.')}; or it is {listed(others)}: these data cannot tell."
-    )
+        return cause.sentence
+    return f"{cause.sentence.removesuffix('.')}; or it is {listed(others)}: these data cannot tell."
 
 
 def less(share: float) -> str:

@@ -1,4 +1,5 @@
-"""Errors of runs on the same test windows: their sentences, tables and JSON."""
+"""The result of `shiplog evaluate`: errors of runs on the same test windows, their sentences,
+tables and JSON."""
 
 from __future__ import annotations
 
@@ -8,26 +9,31 @@ import numpy as np
 import polars as pl
 
 from shiplog.exceptions import listed
+from shiplog.nomenclature.contract import CONTRACT
 from shiplog.nomenclature.numbers import counted
 from shiplog.report.evaluation import tables
 from shiplog.report.evaluation.judgement import MEANING, Judgement, force_line, judge
+from shiplog.report.result import Printed
 from shiplog.training.runs.load_model import Run
 from shiplog.voyages.store import contradicted
 from shiplog.voyages.store.contradicted import Contradicted
 
 
-@dataclass(frozen=True)
-class EvaluatedRuns:
-    """Every run and both baselines on the same test windows.
+@dataclass(frozen=True, repr=False)
+class Evaluation(Printed):
+    """Every run and both baselines on the same measured windows.
 
-    errors     run, seed, voyage, window, elapsed, wind_speed (mean apparent, m/s) and
-               scoring.ERRORS: one row a window and seed
-    rollouts   run, seed, voyage, window, time [s into the voyage], the six states, d
-    coverage   voyage, window, coverage, outside_<channel>, reason: against the first run's data
+    errors     one row per run, seed and window: voyage, elapsed [s], loss (L, Eq. 8 of Wakita et
+               al. 2024), RMSE of surge and sway [m/s] and yaw rate [rad/s], how far off the end is
+               [m], [deg], and wind_speed (mean apparent, m/s)
+    rollouts   one row per run, seed, voyage, window and second: time [s into the voyage], the
+               simulated state (m, m/s, rad, rad/s) and the error d of Eq. 5
+    coverage   one row per window: share of its seconds inside the first run's training data,
+               outside_<channel>, reason
     baseline_losses  L of every window [N]: of holding the velocity, and of quadratic least
                squares on the first run's data
     inside     run, channel, share: of the samples inside the 90 % band, where a run has one
-    forces     of the first physical run along the voyages, as Comparison has them; or None
+    forces     of the first physical run along the voyages, as ComparisonData has them; or None
     contradicted   what was recorded on these voyages and contradicts itself
     """
 
@@ -42,6 +48,14 @@ class EvaluatedRuns:
     inside: pl.DataFrame
     forces: pl.DataFrame | None
     contradicted: tuple[Contradicted, ...] = ()
+
+    @property
+    def json(self) -> dict:
+        """The contract's JSON: of one run its own, of several that of each by its name."""
+        answers = {run.name: self.answer(run) for run in self.runs}
+        return (
+            answers.popitem()[1] if len(answers) == 1 else {"contract": CONTRACT, "runs": answers}
+        )
 
     def answer(self, run: Run) -> dict:
         """The contract's JSON for one run, the share of samples inside its 90 % band, and the
@@ -75,7 +89,8 @@ class EvaluatedRuns:
         length = self.runs[0].profile.ship.length_m
         return judge(run.name, errors, self.baseline_losses, length, self.runs[0].config.window)
 
-    def text(self) -> str:
+    @property
+    def lines(self) -> list[str]:
         """Markdown: a sentence a run, models and baselines, voyages, the worst windows of the
         first run."""
         answers = {f"{run.name}: {run.label}": self.answer(run) for run in self.runs}
@@ -104,4 +119,4 @@ class EvaluatedRuns:
             lines += ["", force_line(self.forces, self.voyages[0])]
         if self.too_short:
             lines += ["", f"Without a window of that length: {listed(self.too_short)}."]
-        return "\n".join(lines)
+        return lines

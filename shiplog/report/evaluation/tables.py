@@ -10,13 +10,13 @@ import polars as pl
 
 from shiplog.exceptions import listed
 from shiplog.logs.health.health_report import (
-    CONTRACT,
     Finding,
     Instrument,
     NotCompared,
     VoyageReport,
 )
 from shiplog.nomenclature.channels import WINDOW
+from shiplog.nomenclature.contract import CONTRACT
 from shiplog.nomenclature.numbers import counted, percent
 from shiplog.report.evaluation.judgement import FEWEST_WINDOWS
 from shiplog.report.evaluation.text_table import table

@@ -10,31 +10,46 @@ from shiplog.nomenclature.channels import WINDOW
 from shiplog.voyages.store.catalogue import UNSHOWN, CatalogueEntry
 
 
-def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
-    """A Markdown table with aligned columns."""
-    head = [_cell(title) for title in head]
-    text = [[_cell(value) for value in row] for row in rows]
-    widths = [
-        max(len(h), *(len(r[i]) for r in text), 3) if text else max(len(h), 3)
-        for i, h in enumerate(head)
-    ]
-    numeric = [
-        bool(rows) and all(isinstance(r[i], (int, float)) for r in rows) for i in range(len(head))
-    ]
+class Table(str):
+    """A table as Markdown, which is drawn from its cells where that reads better.
 
-    def line(cells: Sequence[str]) -> str:
-        padded = [
-            c.rjust(w) if n else c.ljust(w) for c, w, n in zip(cells, widths, numeric, strict=True)
-        ]
-        return f"| {' | '.join(padded)} |"
+    right   of each column, whether it is flush right
+    """
 
-    rule = [("-" * (w - 1) + ":") if n else "-" * w for w, n in zip(widths, numeric, strict=True)]
-    return "\n".join([line(head), line(rule), *map(line, text)])
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    right: tuple[bool, ...]
+
+
+def table(
+    head: Sequence[str], rows: Sequence[Sequence[object]], right: Sequence[str] = ()
+) -> Table:
+    """Cells as text, in aligned columns. Numbers are flush right, and the columns named `right`."""
+    titles = tuple(_cell(title) for title in head)
+    cells = tuple(tuple(_cell(value) for value in row) for row in rows)
+    flush = tuple(
+        title in right or (bool(rows) and all(isinstance(row[i], int | float) for row in rows))
+        for i, title in enumerate(head)
+    )
+    found = Table(_markdown(titles, cells, flush))
+    found.head, found.rows, found.right = titles, cells, flush
+    return found
+
+
+def _markdown(head: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[bool]) -> str:
+    columns = []
+    for flush, cells in zip(right, zip(head, *rows, strict=True), strict=True):
+        title, *others = (cell.replace("|", "\\|") for cell in cells)
+        width = max(3, len(title), *map(len, others))
+        rule = "-" * (width - 1) + ":" if flush else "-" * width
+        align = str.rjust if flush else str.ljust
+        columns.append([align(title, width), rule, *(align(cell, width) for cell in others)])
+    return "\n".join(f"| {' | '.join(row)} |" for row in zip(*columns, strict=True))
 
 
 def _cell(value: object) -> str:
     if isinstance(value, bool) or not isinstance(value, float):
-        return one_line(str(value)).replace("|", "\\|")
+        return one_line(str(value))
     if not math.isfinite(value):
         return "diverged" if value > 0 else "-"
     if value != 0 and abs(value) < 0.001:
@@ -56,13 +71,12 @@ def inert(markdown: str) -> str:
     return markdown.replace("<", "&lt;").replace("](", "]\\(")
 
 
-def catalogue(entries: Sequence[CatalogueEntry]) -> str:
-    """What is in a store; figures that an older program did not write down stay open."""
+def catalogue(entries: Sequence[CatalogueEntry]) -> Table:
+    """What is in a store."""
     rows = [
         (
             e.name, e.ship, e.start[:19], e.seconds,
-            *("-" if known is None else known for known in (e.rate_hz, e.usable_s, e.windows)),
-            e.findings,
+            "-" if e.rate_hz is None else e.rate_hz, e.usable_s, e.windows, e.findings,
         )
         for e in entries
     ]  # fmt: skip

@@ -9,7 +9,7 @@ import polars as pl
 from shiplog.exceptions import listed
 from shiplog.nomenclature.numbers import counted
 from shiplog.report.evaluation import tables
-from shiplog.report.evaluation.evaluation import EvaluatedRuns
+from shiplog.report.evaluation.evaluation import Evaluation
 from shiplog.report.paper import statements
 from shiplog.report.paper.style import named
 from shiplog.training.runs.run_folder import RunFolder
@@ -33,7 +33,7 @@ class Results:
     losses: pl.DataFrame
     histories: pl.DataFrame
     compared: pl.DataFrame
-    evaluation: EvaluatedRuns
+    evaluation: Evaluation
 
 
 def summary(results: Results) -> pl.DataFrame:
@@ -48,7 +48,7 @@ def summary(results: Results) -> pl.DataFrame:
     )
 
 
-def text(results: Results, chosen_by: str, sizes: pl.DataFrame) -> str:
+def lines(results: Results, chosen_by: str, sizes: pl.DataFrame) -> list[str]:
     """Markdown: sets, losses, what the paper states and what these data say."""
     run = next(iter(results.runs.values()))
     baselines = results.evaluation.means
@@ -60,7 +60,7 @@ def text(results: Results, chosen_by: str, sizes: pl.DataFrame) -> str:
         (named(row["set"]), row["seeds"], *(f"{row[name]:.0f}" for name in figures_of))
         for row in summary(results).iter_rows(named=True)
     ]
-    lines = [
+    found = [
         f"# {run.profile.ship.name}: {counted(len(results.runs), 'window set')}",
         "",
         f"Recipe `{run.config.recipe}`, windows of {run.config.window} s; test on "
@@ -84,9 +84,9 @@ def text(results: Results, chosen_by: str, sizes: pl.DataFrame) -> str:
           for row in results.compared.iter_rows(named=True)],
     ]  # fmt: skip
     if results.failures:
-        lines += ["", "## What could not be trained", ""]
-        lines += [f"- {name}: {why}" for name, why in results.failures.items()]
-    return "\n".join(lines)
+        found += ["", "## What could not be trained", ""]
+        found += [f"- {name}: {why}" for name, why in results.failures.items()]
+    return found
 
 
 def _sizes(sizes: pl.DataFrame) -> list[tuple]:

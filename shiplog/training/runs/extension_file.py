@@ -33,7 +33,7 @@ def read(folder: RunFolder, own: Sequence[Cause] = ()) -> Extension | None:
 
     own   causes of the user's own
 
-    Raises RunError for an extension of an earlier program, and for a cause that was not given.
+    Raises RunError for a cause that was not given.
     """
     path = folder.path / "extension.json"
     if not path.is_file():

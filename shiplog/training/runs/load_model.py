@@ -22,7 +22,7 @@ from shiplog.models.starting_values import Start
 from shiplog.simulation import force_breakdown, prediction_interval
 from shiplog.simulation.extended_simulator import ExtendedSimulator, Extension, campaign
 from shiplog.simulation.sensitivities import Simulator
-from shiplog.training.runs import earlier_runs, extension_file, run_folder
+from shiplog.training.runs import extension_file, run_folder
 from shiplog.training.runs.run_folder import RunFolder
 from shiplog.training.settings import run_files
 from shiplog.voyages.rows.recording import Record
@@ -48,8 +48,8 @@ class Base(NamedTuple):
 class Run(RunFolder, ABC):
     """A run folder whose models can be built.
 
-    extension  causes that a diagnosis named and put into it, with the base's coefficients as the
-               program has them today; None for a plain one
+    extension  causes that a diagnosis named and put into it, with the base's coefficients; None
+               for a plain one
     """
 
     extension: Extension | None = None
@@ -142,10 +142,6 @@ class Run(RunFolder, ABC):
     @abstractmethod
     def _with_coefficients(self, plain: Base, coefficients: np.ndarray) -> Base: ...
 
-    @abstractmethod
-    def _today(self, extension: Extension) -> Extension:
-        """An extension as it was written, with coefficients as today's program orders them."""
-
 
 @dataclass(frozen=True)
 class NetworkRun(Run):
@@ -209,14 +205,6 @@ class NetworkRun(Run):
     def _with_coefficients(self, plain: Base, coefficients: np.ndarray) -> Base:
         return plain._replace(model=plain.model.bend(coefficients))
 
-    def _today(self, extension: Extension) -> Extension:
-        if extension.coefficients.any() and extension.coefficients.ndim != 2:
-            raise RunError(
-                f"{self.name} was extended by an earlier shiplog, which bent networks otherwise.",
-                hint="extend its base again with `shiplog diagnose --extend`.",
-            )
-        return extension
-
 
 @dataclass(frozen=True)
 class PhysicalRun(Run):
@@ -232,8 +220,9 @@ class PhysicalRun(Run):
         arrays = run_files.arrays(path)
         try:
             model = self.kind.equations.opened(self.profile, self.config.physics, arrays)
-            place = self._kept(seed, len(arrays["theta"]), model.names)
-            theta, covariance = place.vector(arrays["theta"]), place.matrix(arrays["covariance"])
+            theta = arrays["theta"]
+            self._refuse_others(seed, len(theta), model.names)
+            covariance = arrays["covariance"].reshape(len(theta), len(theta))
         except (KeyError, ValueError, TypeError) as error:
             raise run_files.unreadable(path, error) from error
         if not np.isfinite(theta).all():
@@ -255,9 +244,18 @@ class PhysicalRun(Run):
             return None
         return force_breakdown.along(self.simulator(self.config.seeds[0]), seconds, self.profile)
 
-    def _kept(self, seed: int, count: int, names: Sequence[str]) -> earlier_runs.Kept:
-        neutral = self._nominal().neutral
-        return earlier_runs.kept(self.identified(seed)["name"].to_list(), count, names, neutral)
+    def _refuse_others(self, seed: int, count: int, names: Sequence[str]) -> None:
+        """Raises RunError where the run's coefficients, `count` with a network's weights, are not
+        `names`."""
+        weights = [name for name in names if name.startswith("network.")]
+        was = [*self.identified(seed)["name"], *weights]
+        if was == list(names) and len(was) == count:
+            return
+        which = sorted({*was} ^ {*names}) or [f"{count} numbers instead of {len(names)}"]
+        raise RunError(
+            f"The run was made with other equations than this program's: {listed(which, most=8)}.",
+            hint="train the run again.",
+        )
 
     def _nominal(self) -> Parameters:
         """Coefficients of its equations as published or estimated."""
@@ -272,13 +270,10 @@ class PhysicalRun(Run):
         seed = self.config.seeds[0]
         simulator, known = self.simulator(seed), self.identified(seed)
         more = len(simulator.theta) - len(nominal.names)
-        place = self._kept(seed, known.height, nominal.names)
-        # a hybrid's network stays as it was trained, and so do terms that the run did not have
+        # a hybrid's network stays as it was trained
         start = Start(
             simulator.theta,
-            np.concatenate(
-                (place.vector(known["spread"].to_numpy(), HELD_SPREAD), np.full(more, HELD_SPREAD))
-            ),
+            np.concatenate((known["spread"].to_numpy(), np.full(more, HELD_SPREAD))),
             np.concatenate((nominal.low, np.full(more, -np.inf))),
             np.concatenate((nominal.high, np.full(more, np.inf))),
         )
@@ -296,12 +291,6 @@ class PhysicalRun(Run):
     def _with_coefficients(self, plain: Base, coefficients: np.ndarray) -> Base:
         return self._standing_in(plain.model, replace(plain.start, values=coefficients))
 
-    def _today(self, extension: Extension) -> Extension:
-        seed = self.config.seeds[0]
-        names = self.simulator(seed).model.names
-        place = self._kept(seed, len(extension.coefficients), names)
-        return replace(extension, coefficients=place.vector(extension.coefficients))
-
 
 RUNS = {NETWORK.name: NetworkRun, PHYSICS.name: PhysicalRun}
 
@@ -313,7 +302,7 @@ def of_folder(folder: RunFolder, causes: Sequence[Cause] = ()) -> Run:
     """
     run = RUNS[folder.kind.family.name](folder.path, folder.config, folder.profile)
     extension = extension_file.read(folder, causes)
-    return run if extension is None else replace(run, extension=run._today(extension))
+    return run if extension is None else replace(run, extension=extension)
 
 
 def network(folder: RunFolder) -> NetworkRun:

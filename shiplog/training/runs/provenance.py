@@ -8,29 +8,10 @@ import subprocess
 import sys
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path, PurePath
 
 import polars as pl
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What a command says: to a person and to a machine.
-
-    complete   whether nothing of what it was to write was lost
-    """
-
-    text: str
-    content: dict
-    complete: bool = True
-
-    def after(self, warning: str, **facts: object) -> Answer:
-        """The same after a warning, with facts for a machine; as it is without a warning."""
-        if not warning:
-            return self
-        return replace(self, text=f"{warning}\n{self.text}", content=self.content | facts)
 
 
 def provenance(logs_sha256: Mapping[str, str | None], began: float, device: str = "cpu") -> dict:

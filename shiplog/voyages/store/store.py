@@ -33,8 +33,9 @@ from filelock import FileLock, Timeout
 from pydantic import ValidationError
 
 from shiplog.exceptions import StoreError, listed, nearest
-from shiplog.logs.health.health_report import CONTRACT, VoyageReport
+from shiplog.logs.health.health_report import VoyageReport
 from shiplog.machine import files
+from shiplog.nomenclature.contract import CONTRACT
 from shiplog.ship_profile.differences import differences, readings
 from shiplog.ship_profile.file import advice
 from shiplog.ship_profile.profile import Profile

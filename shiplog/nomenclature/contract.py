@@ -1,0 +1,3 @@
+"""The version of all JSON that shiplog writes."""
+
+CONTRACT = 1

@@ -1,0 +1,87 @@
+"""The result of `shiplog diagnose`: the verdict, and the objects behind it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import polars as pl
+
+from shiplog.diagnosis.linear.linear_segments import Linear
+from shiplog.diagnosis.trial.trial import Trial
+from shiplog.diagnosis.verdict.held_out import HeldOut
+from shiplog.diagnosis.verdict.result import Decision
+from shiplog.report.diagnosis import page
+from shiplog.report.diagnosis.verdict import Verdict
+from shiplog.report.result import Printed
+from shiplog.simulation.extended_simulator import ExtendedSimulator
+from shiplog.training.runs.load_model import Run
+
+RECORDING = "diagnosis.rrd"  # in the folder of a diagnosis
+
+
+@dataclass(frozen=True, repr=False)
+class Diagnosis(Printed):
+    """What the simulation gets wrong, and why.
+
+    verdict    named, none, undecided, unknown, coverage or external, with its sentence
+    folder     of report, verdict and recording
+    simulated  trial and decision of the simulated model; of a network, not those of its MMG
+    whole      that trial, linearised on overlapping segments
+    held       the held-out windows; None where no stretch is long enough for one
+    after      the extended model; None without a named cause
+    drawn      whether the pictures could be drawn
+    extended   the run with the causes in it, where one was asked for and a cause is named
+    """
+
+    verdict: Verdict
+    folder: Path
+    decision: Decision | None = None
+    trial: Trial | None = None
+    simulated: tuple[Trial, Decision] | None = None
+    whole: Linear | None = None
+    held: HeldOut | None = None
+    after: ExtendedSimulator | None = None
+    drawn: bool = True
+    extended: Run | None = None
+
+    @property
+    def report(self) -> Path:
+        """Path of the page, in Markdown."""
+        return self.folder / "report.md"
+
+    @property
+    def recording(self) -> Path | None:
+        """Path of the Rerun recording; None where nothing was compared, or could be drawn."""
+        return self.folder / RECORDING if self.decision is not None and self.drawn else None
+
+    @property
+    def causes(self) -> pl.DataFrame:
+        """One row per named cause: name, probability and sentence."""
+        schema = {"name": pl.String, "probability": pl.Float64, "sentence": pl.String}
+        rows = [tuple(getattr(cause, key) for key in schema) for cause in self.verdict.causes]
+        return pl.DataFrame(rows, schema, orient="row")
+
+    @property
+    def ranking(self) -> pl.DataFrame:
+        """One row per answer: name and probability."""
+        schema = {"name": pl.String, "probability": pl.Float64}
+        rows = [tuple(getattr(answer, key) for key in schema) for answer in self.verdict.ranking]
+        return pl.DataFrame(rows, schema, orient="row")
+
+    @property
+    def lines(self) -> list[str]:
+        """The page, and where the files are."""
+        lines = [*page.lines(self.verdict), f"Report: {self.report}"]
+        if self.recording is not None:
+            lines.append(f"Recording: {self.recording}")
+        elif not self.drawn:
+            lines.append("Recording: none, it could not be made.")
+        if self.extended is not None:
+            lines.append(f"Extended model: {self.extended.path}")
+        return lines
+
+    @property
+    def json(self) -> dict:
+        found = self.verdict.as_json()
+        return found if self.recording is None else found | {"recording": str(self.recording)}
