@@ -16,9 +16,9 @@ from unittest.mock import patch
 import numpy as np
 
 from shiplog.commands.diagnose import diagnose_run
-from shiplog.diagnosis.hypotheses.hypothesis import Hypothesis, form_error
+from shiplog.diagnosis.hypotheses.hypothesis import Hypothesis
 from shiplog.diagnosis.hypotheses.search import Search
-from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL
+from shiplog.diagnosis.noise.remainder import NOMINAL
 from shiplog.diagnosis.verdict import posterior, refutation
 from shiplog.report.evaluation import tables
 from shiplog.voyages.store.store import Store
@@ -77,12 +77,12 @@ def weighed(search: Search) -> str:
 def _row(search: Search, one: Hypothesis, share: float) -> tuple[object, ...]:
     table = search.table
     misfit = sum(table.placebo.get(n, 0.0) for n in (*one.causes, one.kind))
-    force = table._intermittent_alone if one.kind == INTERMITTENT else 0.0
+    prior = table.priors.of(one.causes, one.kind)
+    allowance = one.evidence + prior - misfit - one.score
     return (
         " + ".join(one.causes) or "none", one.kind,
         f"{one.evidence - table.nothing.evidence:.1f}",
-        f"{table.priors.of(one.causes, one.kind):.1f}", f"{misfit:.1f}",
-        f"{form_error(table.alone, one.causes, table.by, force):.1f}",
+        f"{prior:.1f}", f"{misfit:.1f}", f"{abs(allowance):.1f}",
         f"{one.score - table.nothing.score:.1f}", f"{share:.2g}", f"{one.noise_factor:.2f}",
     )  # fmt: skip
 
