@@ -27,10 +27,12 @@ def keep_compiled() -> None:
     """Let JAX keep on disk what it compiles, unless the user has set another folder: later
     processes save some ten seconds a ship. A process that used JAX trims the cache when it ends.
 
-    To be called before JAX is imported.
+    JAX has one such folder a process, and reads its name once. Where it is imported already, it is
+    somebody else's, and nothing is set.
     """
-    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(folder() / "jax"))
-    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
+    if "jax" not in sys.modules:
+        os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(folder() / "jax"))
+        os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
     atexit.unregister(_trim_after_jax)  # once, however often this is called
     atexit.register(_trim_after_jax)
 

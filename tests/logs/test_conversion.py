@@ -235,7 +235,8 @@ def test_two_columns_of_one_channel_are_refused(tmp_path):
 
 def test_a_table_without_rows_or_profile_is_refused(tmp_path):
     (tmp_path / "t.csv").write_text("t,x\n")
-    assert "no row" in str(convert([tmp_path / "t.csv"], profiles.parse(PROFILE, "m"), tmp_path))
+    done = convert([tmp_path / "t.csv"], profiles.parse(PROFILE, "m"), tmp_path)
+    assert "no row" in str(done.refused)
     assert "only a profile says" in str(convert([tmp_path / "t.csv"], None, tmp_path).refused)
 
 

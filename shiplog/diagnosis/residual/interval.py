@@ -18,9 +18,3 @@ class Interval:
     end_s: float
     kind: str
     sentence: str
-
-    def as_json(self) -> dict:
-        return {
-            "voyage": self.voyage, "start_s": self.start_s, "end_s": self.end_s,
-            "kind": self.kind, "sentence": self.sentence,
-        }  # fmt: skip

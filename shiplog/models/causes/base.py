@@ -118,9 +118,6 @@ class ParameterEstimate:
     high: float
     unit: str
 
-    def as_json(self) -> dict:
-        return {"value": self.value, "low": self.low, "high": self.high, "unit": self.unit}
-
 
 @dataclass(frozen=True)
 class Cause:
