@@ -193,14 +193,18 @@ def test_a_profile_that_is_no_text_or_no_file(tmp_path):
 
 
 def test_the_reference_is_what_the_code_reads():
-    page = (Path(__file__).parent.parent / "docs" / "profile.md").read_text(encoding="utf-8")
-    assert page == profile_reference.text(), (
-        "python -m pipelines.experiments.profile_reference --markdown ..."
-    )
+    pages = Path(__file__).parent.parent / "docs" / "reference"
+    for name, text in (
+        ("profile.md", profile_reference.text()),
+        (profile_reference.UNITS, profile_reference.units_text()),
+    ):
+        assert (pages / name).read_text(encoding="utf-8") == text, (
+            "python -m pipelines.experiments.profile_reference --markdown ..."
+        )
 
 
 def test_the_reference_has_every_key_kind_channel_and_unit():
-    page = profile_reference.text()
+    page = profile_reference.text() + profile_reference.units_text()
     sections = (profile.Ship, profile.Sensor, profile.Actuator, profile.Site, profile.Column)
     keys = {key for section in sections for key in section.model_fields}
     kinds = {f'"{kind}"' for each in profile_channels.SENSOR_KINDS.values() for kind in each}
@@ -215,7 +219,7 @@ def test_the_reference_has_every_key_kind_channel_and_unit():
     ):
         assert f"`{word}`" in page
     example = page[page.index("    [ship]") : page.index("Position, velocity and heading")]
-    ship = profile_file.parse(textwrap.dedent(example), "docs/profile.md")
+    ship = profile_file.parse(textwrap.dedent(example), "docs/reference/profile.md")
     assert ship.sensors.position.lever_arm_m == (3.2, 0.0)
 
 

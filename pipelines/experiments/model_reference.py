@@ -1,6 +1,6 @@
-"""The pages docs/catalogue.md and docs/coefficients.md, from the code that they describe.
+"""The pages catalogue.md and coefficients.md of docs/reference, from the code that they describe.
 
-python -m pipelines.experiments.model_reference --docs docs
+python -m pipelines.experiments.model_reference --docs docs/reference
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from shiplog.report.evaluation import tables
 CATALOGUE_HEAD = """# The catalogue of causes
 
 What `shiplog diagnose` tests and can name. Each cause is a term of the model that is zero where the
-cause is absent. [diagnosis.md](diagnosis.md) describes how one is chosen, and how to add one.
+cause is absent. The [method](../science/method.md) says how one is chosen,
+[a cause of your own](../use/own_cause.md) how to add one.
 
 The *realistic size* is the standard deviation of a change between two campaigns, from the
 literature that the cause's docstring names. Below the *practical size* a cause counts as no change.
@@ -88,7 +89,7 @@ COEFFICIENTS_HEAD = """# The coefficients of the physics
 
 These are the keys of `<profile>.mmg.toml` (or `--parameters FILE`), and of `seed0/parameters.toml`
 in a run. `--free` takes the same names: `--free 'wind.*'` identifies the wind's coefficients alone.
-[physics.md](physics.md) describes the forces.
+[physics.md](../science/physics.md) describes the forces.
 
     source = "model tests of 2024"
 
@@ -181,7 +182,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--docs", type=Path, default=Path("docs"), help="the folder of the pages")
+    parser.add_argument(
+        "--docs", type=Path, default=Path("docs/reference"), help="the folder of the pages"
+    )
     folder = parser.parse_args().docs
     (folder / "catalogue.md").write_text(catalogue(), encoding="utf-8")
     (folder / "coefficients.md").write_text(coefficients(), encoding="utf-8")

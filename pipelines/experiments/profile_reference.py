@@ -1,6 +1,7 @@
-"""The reference of the profile format, docs/profile.md, from the code that reads profiles.
+"""The reference of the profile format, from the code that reads profiles: docs/reference/profile.md
+and, beside it, units.md.
 
-python -m pipelines.experiments.profile_reference --markdown docs/profile.md
+python -m pipelines.experiments.profile_reference --markdown docs/reference/profile.md
 """
 
 from __future__ import annotations
@@ -68,8 +69,9 @@ and its sensors checked, and no model can be trained.
 Axes: x0 to the north, y0 to the east, x ahead, y to starboard, angles clockwise; a positive rudder
 turns the bow to starboard; the wind's angle is where it blows from, clockwise from the bow.
 
-[catalogue.md](catalogue.md) lists what a cause of a diagnosis needs of a profile, and
-[coefficients.md](coefficients.md) the file `my-ship.mmg.toml` that may stand next to it.
+The [units](units.md) of a value and the channels of a table's columns have a page of their own.
+[Catalogue](catalogue.md) lists what a cause of a diagnosis needs of a profile, and
+[coefficients](coefficients.md) the file `my-ship.mmg.toml` that may stand next to it.
 """
 
 MEANT = {  # each kind of a sensor in words
@@ -106,14 +108,20 @@ ACTUATORS = {  # kind → what its value is, in which units, and what `mmg` and 
 }  # fmt: skip
 
 
+UNITS = "units.md"  # the second page
+
+
 def text() -> str:
-    """The whole page."""
+    """The page of keys and kinds."""
     source = set(profile.Source.model_fields)
     actuator = [name for name in profile.Actuator.model_fields if name not in source]
     sensor = [name for name in profile.Sensor.model_fields if name not in source]
     return "\n".join(
         (
             HEAD,
+            "Profiles to start from, in `shiplog/profiles/`: "
+            + ", ".join(f"`{name}`" for name in profile_file.shipped())
+            + ".\n",
             "## [ship]\n",
             "Missing values are estimated where they are needed, and reported.\n",
             _keys(profile.Ship),
@@ -136,7 +144,19 @@ def text() -> str:
             "For `shiplog convert`: what the columns of a table hold. A key is a column's name; "
             '`"column" = "channel"`\nis short for a column in SI units.\n',
             _keys(profile.Column),
-            "\n### Channels of a table\n",
+            "",
+        )
+    )
+
+
+def units_text() -> str:
+    """The page of channels and units."""
+    return "\n".join(
+        (
+            "# Channels and units of a profile\n",
+            "The keys of a profile are on the page [profile](profile.md).\n",
+            "## Channels of a table\n",
+            "What a column of `[table]` can be.\n",
             _channels(),
             "\n## Units\n",
             "Factors to SI; propellers are in rev/s. `pwm` is a servo pulse in µs: `offset` is the "
@@ -149,10 +169,6 @@ def text() -> str:
             "a rudder or azimuth\nas 1 rad, and of a propeller as 1 rev/s. Give another size of "
             "full command as a factor in `sign`: 0.61 for a\nrudder that stands at 35 deg (0.61 "
             "rad) then, 12.5 for a shaft that turns at 12.5 rev/s.\n",
-            "## Shipped profiles\n",
-            "These are in `shiplog/profiles/`, to start from:\n",
-            *(f"- `{name}`" for name in profile_file.shipped()),
-            "",
         )
     )
 
@@ -251,9 +267,10 @@ def main() -> None:
     parser.add_argument("--markdown", type=Path, metavar="PATH", help="write it there")
     path = parser.parse_args().markdown
     if path is None:
-        print(text())
+        print(text(), units_text(), sep="\n")
     else:
         path.write_text(text(), encoding="utf-8")
+        path.with_name(UNITS).write_text(units_text(), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
-"""The keys of a verdict in docs/formats.md, from the dataclasses that are written.
+"""The keys of a verdict in docs/reference/answers.md, from the dataclasses that are written.
 
-python -m pipelines.experiments.verdict_reference --markdown docs/formats.md
+python -m pipelines.experiments.verdict_reference --markdown docs/reference/answers.md
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ BEGIN, END = "### `diagnose --json` and `verdict.json`", "The names of causes an
 WORDS = "`named`, `none`, `unknown`, `undecided`, `coverage` or `external`"
 # Key → what it holds: a dataclass, whose docstring says what of, or a sentence.
 KEYS: dict[str, type | str] = {
-    "verdict": f"{WORDS}; [diagnosis.md](diagnosis.md) has their meaning",
+    "verdict": f"{WORDS}; [reading a verdict](../use/reading_a_verdict.md) has their meaning",
     "sentence": "the answer in words",
     "causes": NamedCause,
     "ranking": Ranked,

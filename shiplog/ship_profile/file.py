@@ -94,7 +94,7 @@ def parse(text: str, source: str) -> Profile:
                 f"The profile {source} has no {' and no '.join(lacking)}, and shiplog needs "
                 f"{' and '.join(NEEDED)} of a ship.",
                 hint="; ".join(f"{name}: record {NEEDED[name]}" for name in lacking)
-                + ". Where the log has it, add [sensors.NAME] by hand (docs/profile.md).",
+                + ". Where the log has it, add [sensors.NAME] by hand (docs/reference/profile.md).",
             ) from error
         raise ProfileError(
             f"The profile {source} cannot be used: {advice(error)}.",

@@ -29,7 +29,7 @@ def tour(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         patch.setattr(search, "MOST_SETS", 3)  # what a verdict says is tested elsewhere
-        yield folder, runpy.run_path(str(ROOT / "docs" / "tour.py"))
+        yield folder, runpy.run_path(str(ROOT / "docs" / "start" / "tour.py"))
 
 
 def test_its_results_are_frames_and_files(tour):
@@ -51,7 +51,7 @@ def test_the_ten_lines_of_the_readme_are_calls_of_the_notebook():
     """With the same arguments; the notebook may give further ones."""
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     lines = calls(readme.split("```python\n")[1].split("```")[0])
-    notebook = calls((ROOT / "docs" / "tour.py").read_text(encoding="utf-8"))
+    notebook = calls((ROOT / "docs" / "start" / "tour.py").read_text(encoding="utf-8"))
     assert list(lines) == ["ingest", "train", "evaluate", "compare", "diagnose"]
     for name, arguments in lines.items():
         assert arguments <= notebook[name], name

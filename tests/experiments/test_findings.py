@@ -1,4 +1,4 @@
-"""The figures of docs/results that take no minutes, against answers found by other means."""
+"""The figures of docs/evidence that take no minutes, against answers found by other means."""
 
 import numpy as np
 import polars as pl

@@ -69,3 +69,28 @@ def test_a_model_that_diverged_is_not_one_that_was_not_evaluated():
         if line.startswith("| KVLCC2")
     ]
     assert [cells[4:8] for cells in lines] == [["50", "diverged", "90", "diverged"], ["-"] * 4]
+
+
+def test_a_ships_page_keeps_what_is_not_an_answer(tmp_path):
+    table, ship = tmp_path / "measured_ships.md", tmp_path / "kvlcc2.md"
+    one = way.Way("kvlcc2", "stopped.", {}, 1.0, False)
+    page.write(table, [one])
+    assert [path.name for path in sorted(tmp_path.iterdir())] == ["kvlcc2.md", "measured_ships.md"]
+    by_hand = ship.read_text("utf-8") + "\n## By hand\n\nKept.\n"
+    ship.write_text(by_hand.replace("stopped.", "something else."), "utf-8")
+    page.write(table, [one])
+    assert ship.read_text("utf-8") == by_hand and "> stopped." in by_hand
+
+
+def test_every_data_set_has_a_page():
+    named = [name for _, names in page.PAGES.values() for name in names]
+    assert sorted(named) == sorted(page.DATA_SETS)
+
+
+def test_the_pages_of_the_documentation_have_the_judgements():
+    folder = Path(__file__).parents[2] / "docs" / "evidence"
+    for name, (title, names) in page.PAGES.items():
+        text = (folder / f"{name}.md").read_text("utf-8")
+        assert text.startswith(f"# {title}\n") and page.MARKED.search(text)
+        for one in names:
+            assert page._filled(page.JUDGEMENTS[one]) in text

@@ -319,9 +319,12 @@ def scored(*answers):
     return [score.Score("goals", tuple(answers), (), ())]
 
 
-def test_the_page_begins_with_what_went_wrong_the_worst_first():
-    text = validation.page(scored(*ANSWERS)).text
-    assert text.index("## What went wrong") < text.index("## Goals") < text.index("## All methods")
+def test_the_page_begins_with_three_numbers_and_the_misses_have_their_own_the_worst_first():
+    page = validation.page(scored(*ANSWERS))
+    text, first = page.text, page.pages[""]
+    assert first.index("Three numbers") < first.index("## Goals") < first.index("## Reliability")
+    assert page.pages[validation.MISSES].startswith("# What went wrong")
+    assert text.index("# What went wrong") < text.index("## All methods")
     lines = [line for line in validation.misses(ANSWERS).splitlines() if line.startswith("|")][2:]
     assert [line.strip("| ").split("|")[0].strip() for line in lines] == [
         "2", "6", "4", "9", "10", "3", "8",

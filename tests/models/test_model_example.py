@@ -1,4 +1,4 @@
-"""A model is one file and one line: the example of docs/extending.md, the whole way."""
+"""A model is one file and one line: the example of docs/develop, the whole way."""
 
 import importlib
 import json
@@ -19,8 +19,8 @@ from shiplog.ship_profile import file as profiles
 from shiplog.training.runs import load_model
 from shiplog.training.settings.run_config import Physics
 
-DOCS = Path(__file__).parents[2] / "docs"
-LINE = re.compile(r'^ +("kt": Kind\(.*\),)$', re.MULTILINE)
+DOCS = Path(__file__).parents[2] / "docs" / "develop"
+LINE = re.compile(r'^\+ +("kt": Kind\(.*\),)$', re.MULTILINE)
 
 
 @pytest.fixture
@@ -29,7 +29,7 @@ def kt(monkeypatch):
     monkeypatch.syspath_prepend(DOCS / "examples")
     module = importlib.import_module("kt")
     monkeypatch.setitem(sys.modules, "shiplog.models.kt", module)
-    (line,) = LINE.findall((DOCS / "extending.md").read_text(encoding="utf-8"))
+    (line,) = LINE.findall((DOCS / "extending_models.md").read_text(encoding="utf-8"))
     row = eval(f"{{{line}}}", vars(shiplog.models).copy())
     monkeypatch.setitem(MODELS, "kt", row["kt"])
     return module

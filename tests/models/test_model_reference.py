@@ -8,14 +8,14 @@ from pipelines.experiments import model_reference
 from shiplog.models.causes import CATALOGUE
 from shiplog.models.mmg.parameters import TABLE
 
-DOCS = Path(__file__).parent.parent.parent / "docs"
+DOCS = Path(__file__).parents[2] / "docs" / "reference"
 
 
 @pytest.mark.parametrize("page", ["catalogue", "coefficients"])
 def test_the_page_is_what_the_code_has(page):
     text = (DOCS / f"{page}.md").read_text(encoding="utf-8")
     assert text == getattr(model_reference, page)(), (
-        "python -m pipelines.experiments.model_reference --docs docs"
+        "python -m pipelines.experiments.model_reference --docs docs/reference"
     )
 
 

@@ -1,4 +1,4 @@
-"""The page of formats names every word that a machine may read."""
+"""The pages of formats name every word that a machine may read."""
 
 import re
 from dataclasses import fields
@@ -15,7 +15,12 @@ from shiplog.nomenclature.contract import CONTRACT
 from shiplog.report.diagnosis.sections.structure import DEPENDS
 from shiplog.report.diagnosis.verdict import Verdict
 
-PAGE = (Path(__file__).parents[2] / "docs" / "formats.md").read_text(encoding="utf-8")
+PAGES = Path(__file__).parents[2] / "docs" / "reference"
+PAGE = "\n".join(
+    (PAGES / f"{name}.md").read_text(encoding="utf-8")
+    for name in ("formats", "streams", "findings", "answers")
+)
+ANSWERS_PAGE = (PAGES / "answers.md").read_text(encoding="utf-8")
 WORDS = set(re.findall(r"`([^`]+)`", PAGE))
 ROWS = {
     cells[0]: cells[1:]
@@ -55,8 +60,8 @@ def test_every_key_of_a_report_and_a_verdict_is_there():
 
 
 def test_the_part_on_the_verdict_is_what_the_code_writes():
-    assert verdict_reference.page(PAGE) == PAGE, (
-        "python -m pipelines.experiments.verdict_reference --markdown docs/formats.md"
+    assert verdict_reference.page(ANSWERS_PAGE) == ANSWERS_PAGE, (
+        "python -m pipelines.experiments.verdict_reference --markdown docs/reference/answers.md"
     )
     empty = Verdict("none", "", "run", True, "").as_json()
     written = {*empty, "structure", "gain", "recording"} - {"contract"}

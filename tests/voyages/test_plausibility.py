@@ -303,7 +303,7 @@ def test_a_heading_that_is_contradicted_says_nothing_of_the_vane():
 
 def test_the_page_has_every_row_with_its_limits():
     """A limit that is asked and stands on no page would be a hidden one."""
-    page = (Path(__file__).parents[2] / "docs" / "plausibility.md").read_text("utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "reference" / "plausibility.md").read_text("utf-8")
     section = page.partition("\n## ")[0]
     rows = {
         cells[0]: cells[1:]

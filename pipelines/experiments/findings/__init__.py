@@ -1,1 +1,1 @@
-"""What shiplog says of measured ships: the figures of docs/results."""
+"""What shiplog says of measured ships: the figures of docs/evidence."""

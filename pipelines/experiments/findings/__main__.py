@@ -1,4 +1,4 @@
-"""What shiplog says of measured ships: the figures of docs/results.
+"""What shiplog says of measured ships: the figures of docs/evidence.
 
     python -m pipelines.experiments.findings sensors     FRT-DS-ESSO --out findings
     python -m pipelines.experiments.findings published   FRT-DS-ESSO --out findings

@@ -23,8 +23,8 @@ python -m pipelines.experiments.hidden_effects replay DIR [--out NEW] [--rivals]
     --whole from their logs on, for a program that cannot read their stores and models
 python -m pipelines.experiments.hidden_effects score DIR
     the tables again, of what is there by now
-python -m pipelines.experiments.hidden_effects scores DIR [DIR ...] [--markdown docs/validation.md]
-    the validation page: misses first, then the scores of all methods, home and abroad apart
+python -m pipelines.experiments.hidden_effects scores DIR [DIR ...] [--markdown PATH]
+    the pages of validation: goals, misses, the scores of all methods, home and abroad apart
 python -m pipelines.experiments.hidden_effects pack DIR [DIR ...] --into FILE.tar.xz
     their answers and keys in one file, which `scores` takes as well as folders; unpacked with
     `tar -xf`, a test goes on where it was

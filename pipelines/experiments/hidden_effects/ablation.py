@@ -19,7 +19,7 @@ from shiplog.report.evaluation import tables
 WHOLE = "nothing"  # taken out: the decision as it is
 TITLE = "# The decision without one of its parts"
 COMMAND = """\
-    tar -xf docs/validation-answers.tar.xz -C test
+    tar -xf docs/evidence/validation-answers.tar.xz -C test
     python -m pipelines.experiments.hidden_effects remake test/goals --share --jobs 2
     python -m pipelines.experiments.hidden_effects remake test/abroad --jobs 2
     python -m pipelines.experiments.hidden_effects.without --ablate test/goals --every 2 \\
@@ -31,9 +31,9 @@ COMMAND = """\
     python -m pipelines.experiments.hidden_effects.without --ablate test/abroad --every 20 \\
         --only before-search
     python -m pipelines.experiments.hidden_effects.without --page test/goals-without \\
-        test/abroad-without --markdown docs/results/ablation.md"""
+        test/abroad-without --markdown docs/evidence/ablation.md"""
 INTRODUCTION = """\
-Cases of [validation](../validation.md) were diagnosed once as they are, and again without a part of
+Cases of [validation](validation.md) were diagnosed once as they are, and again without a part of
 the decision, one part after the other. The cases are every so many of the test, not chosen by what
 was answered. A part that acts after the search is taken out of that same search; the other parts
 need a search of their own, and were tested on fewer cases. With so few, a part that changes no

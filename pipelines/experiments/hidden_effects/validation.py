@@ -1,13 +1,14 @@
-"""The validation page: what went wrong, then every score, of all cases of one program.
+"""The pages of validation, of all cases of one program: three numbers, the reliability diagram
+and the goals; what went wrong; and other methods, intervals of parameters and cost.
 
 Written by `python -m pipelines.experiments.hidden_effects scores DIR [DIR ...]
---markdown docs/validation.md`.
+--markdown docs/evidence/validation.md`.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,16 +36,31 @@ class Mixed(ShiplogError):
     """Verdicts of several programs, or the same case twice: they have no table in common."""
 
 
+MISSES, METHODS = "_misses", "_methods"  # behind the page's name
+
+
 @dataclass(frozen=True, slots=True)
 class Page:
-    text: str
-    picture: str  # SVG
+    """What stands behind the page's name → a page; and the picture of the first one, SVG."""
+
+    pages: Mapping[str, str]
+    picture: str
+
+    @property
+    def text(self) -> str:
+        """All pages, one after the other."""
+        return "\n\n".join(self.pages.values())
 
     def write(self, path: Path) -> None:
-        """Page and, next to it, its picture."""
+        """The page and, next to it, the others and the picture."""
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(self.text + "\n", encoding="utf-8")
+        for behind, text in self.pages.items():
+            page_of(path, behind).write_text(text + "\n", encoding="utf-8")
         picture_of(path).write_text(self.picture, encoding="utf-8")
+
+
+def page_of(path: Path, behind: str) -> Path:
+    return path.with_name(f"{path.stem}{behind}{path.suffix}")
 
 
 def picture_of(path: Path) -> Path:
@@ -65,40 +81,82 @@ def page(found: Sequence[Score], path: Path | None = None) -> Page:
     there = {place: by_place[place] for place in PLACES if by_place[place]}
     stated = {place: goals.statements(given) for place, given in there.items()}
     standing = {place: ranks.standings(given) for place, given in there.items()}
-    picture = picture_of(path).name if path else ""
-    parts = [
+    at = path or PAGE
+    others = {behind: page_of(at, behind).name for behind in (MISSES, METHODS)}
+    diagram = f"![Share true over the reported probability]({picture_of(at).name})"
+    first = [
         "# Validation on hidden effects",
+        THREE,
+        three_numbers(there),
+        *([diagram] if path else []),
+        OTHERS.format(misses=others[MISSES], methods=others[METHODS]),
+        "## What was run",
         _head(found, answers, of),
-        _legend(answers),
-        "## What went wrong",
-        *(part for place, one in there.items() for part in (f"### {heading(place)}", misses(one))),
         "## Goals, this program",
         INTERVAL,
         goals.table(by_place[goals.SAME], by_place[goals.OTHER]),
         *(["### Each type of ship", types(by_place[goals.OTHER])] if by_place[goals.OTHER] else []),
-        *(part for place, given in there.items() for part in _methods(place, given)),
         "## Reliability",
-        *([f"![Share true over the reported probability]({picture})"] if picture else []),
         reliability.table(stated),
+    ]
+    second = [
+        "# What went wrong",
+        f"Every case of the [validation]({at.name}) whose verdict is not right, the worst first.",
+        *(part for place, one in there.items() for part in (f"## {heading(place)}", misses(one))),
+        "## Words of the tables",
+        _legend(answers),
+    ]
+    third = [
+        "# Validation: other methods, intervals, cost",
+        f"Of the cases of the [validation]({at.name}); its words are [listed]({others[MISSES]}"
+        "#words-of-the-tables).",
+        *(part for place, given in there.items() for part in _methods(place, given)),
         "## Parameters: intervals and ranks",
         PARAMETERS,
         ranks.coverage_table(standing),
         ranks.rank_table(standing),
         *(part for place, given in there.items() for part in _cost(place, given)),
+    ]
+    pages = {"": first, MISSES: second, METHODS: third}
+    return Page(
+        {behind: "\n\n".join(parts) for behind, parts in pages.items()}, reliability.svg(stated)
+    )
+
+
+PAGE = Path("validation.md")  # where none is given
+THREE = """\
+How often a verdict of `shiplog diagnose` is right, measured on simulated ships. Each verdict was
+stored before the hidden answer was read. Three numbers:"""
+OTHERS = """\
+*The diagram: of all that was reported with a probability, the share that is true. On the diagonal a
+probability says what it means.* [What went wrong]({misses}) lists every case that is not right, and
+the words of the tables. [Other methods, intervals, cost]({methods}) compares simpler methods on the
+same cases."""
+
+
+def three_numbers(answers: Mapping[str, Sequence[Answer]]) -> str:
+    """Of each family of ships: a wrong name, a certain statement, a false alarm."""
+    rows = [
+        (what, *(goals.figures(given).get(row, (0.0, goals.NOT_MEASURED))[1]
+                 for given in answers.values()))
+        for what, row in (
+            ("a cause is named that is not there", goals.RATES[0].what),
+            (f"what is reported with {goals.STATED:g} or more is true", goals.CERTAIN),
+            ("nothing has changed, and the verdict is not `none`", goals.RATES[2].what),
+        )
     ]  # fmt: skip
-    return Page("\n\n".join(parts), reliability.svg(stated))
+    return tables.table(("", *(f"{place} of equations" for place in answers)), rows)
 
 
 COMMAND = """\
-    python -m pipelines.experiments.hidden_effects scores docs/validation-answers.tar.xz \\
-        --markdown docs/validation.md"""
+    python -m pipelines.experiments.hidden_effects scores docs/evidence/validation-answers.tar.xz \\
+        --markdown docs/evidence/validation.md"""
 INTRODUCTION = """\
-How often a verdict of `shiplog diagnose` is right, measured on simulated ships. In each case a ship
-makes a nominal campaign, from which a model is identified (`train --model mmg`). In a later trial
-of 7000 or 500 s (longer for a large ship) nothing is hidden, or one cause of the
-[catalogue](catalogue.md), or two causes, or an effect outside the catalogue. Each verdict was
-stored with its hash before the hidden answer was read. The [glossary](glossary.md) defines the
-terms of a verdict.
+In each case a ship makes a nominal campaign, from which a model is identified (`train --model
+mmg`). In a later trial of 7000 or 500 s (longer for a large ship) nothing is hidden, or one cause
+of the [catalogue](../reference/catalogue.md), or two causes, or an effect outside the catalogue.
+Each verdict was stored with its hash before the hidden answer was read. The
+[glossary](../science/glossary.md) defines the terms of a verdict.
 
 *Same family of equations*: a ship of MMG form, as the model is. The simulator shares no code with
 shiplog but the writer of the logs, and all coefficients have to be identified. Its hull, wind, wake
@@ -116,8 +174,6 @@ and no shallow water. A [table](#each-type-of-ship) has the figures of each type
 
 Cases that were run:"""
 LEGEND = """\
-Words of the tables:
-
 - **x1** is a realistic size of what is hidden; **x0.3** is three tenths of it. *Size 1* and *size
   0.3* are the same.
 - **Right**: the verdict names all that is hidden and nothing else; where nothing is hidden, it is
@@ -135,7 +191,7 @@ Words of the tables:
   probable ones. Calibration error, *reported with 0.9 or more* and the reliability diagram are over
   statements. A statement can be true in a case whose verdict is not right.
 - **Probability** in the lists of what went wrong is that of the first statement. It is 0.00 where
-  the remainder is not in the ranking: by [rule 10](diagnosis.md#rules) a wrong sign, or a model
+  the remainder is not in the ranking: by [rule 10](../science/rules.md) a wrong sign, or a model
   worse than constant velocities, is answered `unknown`, whatever the ranking is.
 - **Outside the catalogue**, with the right remainder: `tether`, a line to a fixed point (position);
   `tow`, a force in one direction that grows during the trial (time); `propeller_side_force`, a
@@ -164,7 +220,7 @@ RIVALS = {
     "glr": "- **Likelihood ratio** compares rollouts with and without each cause, the errors taken "
     "as white noise. It, too, names one cause or none.",
 }
-# The machine is that of docs/validation-answers.tar.xz: the answers do not record it.
+# The machine is that of docs/evidence/validation-answers.tar.xz: the answers do not record it.
 COST = """\
 Processor time, elapsed time and memory of `shiplog diagnose`, a case, on an Intel Xeon, each
 case on one core. Two cases ran at a time on two cores that also had other work: elapsed time is

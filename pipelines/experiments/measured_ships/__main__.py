@@ -1,4 +1,4 @@
-"""Every data set at hand, from its files to a verdict: the table of docs/measured_ships.md.
+"""Every data set at hand, from its files to a verdict: docs/evidence/measured_ships.md.
 
     python -m pipelines.experiments.measured_ships DATA --out measured [--only NAME ...]
         [--markdown PATH]
@@ -25,15 +25,16 @@ def main() -> int:
     parser.add_argument("data", type=Path, metavar="DATA")
     parser.add_argument("--out", type=Path, required=True, help="logs, stores, runs, reports")
     parser.add_argument("--only", nargs="+", choices=DATA_SETS, default=list(DATA_SETS))
-    parser.add_argument("--markdown", type=Path, metavar="PATH", help="write the page there")
+    parser.add_argument(
+        "--markdown", type=Path, metavar="PATH", help="write the table there, the ships beside it"
+    )
     given = parser.parse_args()
     logging.basicConfig(format="%(message)s", level=logging.INFO)
     ways = [way.go(name, DATA_SETS[name], given.data, given.out) for name in given.only]
-    text = page.text(ways)
     if given.markdown is None:
-        print(text)
+        print(page.text(ways), *(page.answers([one]) for one in ways), sep="\n\n")
     else:
-        given.markdown.write_text(text, encoding="utf-8")
+        page.write(given.markdown, ways)
     return int(any(one.traceback for one in ways))
 
 

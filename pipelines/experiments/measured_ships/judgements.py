@@ -5,10 +5,10 @@ from __future__ import annotations
 JUDGEMENTS: dict[str, str] = {
     "esso-osaka": (
         "Believable. The tests are of one ship, from July to November 2020, and no change of the "
-        "ship is known. In the berthings of 12 November the yaw rate is about 0.9 s late ([Esso "
-        "Osaka](results/esso_osaka.md)); such berthings are among the nominal voyages, too, so "
-        "that this is no change between the two campaigns. Eight tests are too few to confirm it. "
-        "On tests that were held out, the physics have half of the regression's L."
+        "ship is known. In the berthings of 12 November the yaw rate is about 0.9 s late "
+        "([below](#sensors-against-each-other)); such berthings are among the nominal voyages, "
+        "too, so that this is no change between the two campaigns. Eight tests are too few "
+        "to confirm it. On tests that were held out, the physics have half of the regression's L."
     ),
     "esso-osaka, published": (
         "Believable in part. The position's clock is right: the sensors alone give 0.95 s between "

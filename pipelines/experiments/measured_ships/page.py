@@ -1,9 +1,14 @@
-"""The table of all data sets, and a sentence on whether to believe each answer."""
+"""The table of all data sets; and a page a ship, which begins with its answers and a judgement.
+
+What stands between the marks of a ship's page is written here; the rest of the page is kept.
+"""
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Sequence
+from pathlib import Path
 
 from pipelines.experiments.measured_ships.judgements import JUDGEMENTS
 from pipelines.experiments.measured_ships.ships import DATA_SETS
@@ -15,38 +20,76 @@ WIDTH = 100  # letters of a line
 HEAD = """# Measured ships, from their files to a verdict
 
     python -m pipelines.experiments.measured_ships DATA --out measured \\
-        --markdown docs/measured_ships.md
+        --markdown docs/evidence/measured_ships.md
 
 Each data set is treated as its owner would treat it: a profile (shipped, or drafted and completed
 where it says CHECK), `convert`, `ingest`, `train --model mmg`, `evaluate`, and `diagnose` on the
-voyages that were not trained on. It ends with a verdict, or with what these data lack for one. None
-of the data are part of this repository. L is the paper's loss ([glossary](glossary.md)); the
-baselines hold the velocity, and fit a quadratic by least squares to the training voyages. Where
-that one has a *, the training voyages are among those that L is of. The split of the voyages is
-shiplog's and not the published one, so that L is not comparable with that of other pages. One file
-of the Esso Osaka repeats the beginning of another; it is included here, which gives 121 windows
-instead of 119.
+voyages that were not trained on. It ends with a verdict, or with what these data lack for one.
+None of the data are part of this repository. L is the paper's loss
+([glossary](../science/glossary.md)); the baselines hold the velocity, and fit a quadratic by
+least squares to the training voyages. Where that one has a *, the training voyages are among
+those that L is of. The split of the voyages is shiplog's and not the published one, so that L is
+not comparable with that of other pages. One file of the Esso Osaka repeats the beginning of
+another; it is included here, which gives 121 windows instead of 119.
 
-*Explained* is the share of the error on held-out windows that the named causes take away. The
-paragraph below each answer is the authors' judgement of it.
+*Explained* is the share of the error on held-out windows that the named causes take away. Each
+ship's page begins with its answer, and with the authors' judgement of it.
 """
+# Page → its title, and the data sets on it.
+PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
+    "esso_osaka": ("Esso Osaka, 3 m", ("esso-osaka", "esso-osaka, published")),
+    "kvlcc2": ("KVLCC2: HSVA's model, and MARIN's", ("kvlcc2", "kvlcc2, full scale")),
+    "blueboat": ("BlueBoat, 1.2 m", ("blueboat",)),
+    "milliampere": ("milliAmpere, 5 m ferry", ("milliampere",)),
+    "another_simulator": ("3 m ship of another simulator", ("other_ship",)),
+    "usv": ("Two unmanned surface vehicles", ("usv_fuzhou", "qixing")),
+    "ferries": ("Ferries and a container ship at 1 Hz", ("tycho-brahe", "aurora", "hakusan")),
+    "other_logs": (
+        "Logs that are not of one ship", ("mcap, location", "mcap, battery", "mcap, AIS"),
+    ),
+}  # fmt: skip
+BEGIN, END = "<!-- answers: written by measured_ships -->", "<!-- end of answers -->"
+MARKED = re.compile(f"{re.escape(BEGIN)}.*{re.escape(END)}", re.DOTALL)
 
 
 def text(ways: Sequence[Way]) -> str:
-    """The page: a table, and each data set's answer below it."""
+    """The table of all."""
     head = (
         "ship", "voyages", "usable, s", "windows of 100 s", "window of L, s", "L", "L of hold",
         "L of least squares", "verdict", "explained", "processor time of all commands, s",
     )  # fmt: skip
-    lines = [
-        HEAD,
-        tables.table(head, [_row(one) for one in ways]),
-        "",
-    ]
+    listed = (f"- [{title}]({name}.md)" for name, (title, _) in PAGES.items())
+    return "\n".join(
+        (
+            HEAD,
+            tables.table(head, [_row(one) for one in ways]),
+            "",
+            "A page a ship:",
+            "",
+            *listed,
+            "",
+        )
+    )
+
+
+def answers(ways: Sequence[Way]) -> str:
+    """What a ship's page begins with: the answer of each of its data sets, and the judgement."""
+    parts = [BEGIN]
     for one in ways:
-        lines += [f"## {DATA_SETS[one.name].ship}\n", f"{_answer(one)}\n"]
-        lines += [f"{_filled(JUDGEMENTS[one.name])}\n"] if one.name in JUDGEMENTS else []
-    return "\n".join(lines)
+        parts += [f"## {DATA_SETS[one.name].ship}: the answer", _answer(one)]
+        parts += [_filled(JUDGEMENTS[one.name])] if one.name in JUDGEMENTS else []
+    return "\n\n".join((*parts, END))
+
+
+def write(path: Path, ways: Sequence[Way]) -> None:
+    """The table, and the pages of ships beside it."""
+    path.write_text(text(ways), encoding="utf-8")
+    for name, (title, of) in PAGES.items():
+        there = path.with_name(f"{name}.md")
+        before = there.read_text("utf-8") if there.exists() else f"# {title}\n\n{BEGIN}{END}\n"
+        if chosen := [one for one in ways if one.name in of]:
+            new = answers(chosen)
+            there.write_text(MARKED.sub(lambda _, new=new: new, before), encoding="utf-8")
 
 
 def _row(one: Way) -> tuple[object, ...]:

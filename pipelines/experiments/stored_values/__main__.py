@@ -3,7 +3,7 @@
     python -m pipelines.experiments.stored_values --voyages 1000 --jobs 2 --out OUT
 
 OUT/outcomes.jsonl has a line a voyage; a run that was stopped goes on. `--one SEED` prints one,
-`--markdown docs/stored_values.md` writes the page.
+`--markdown docs/evidence/stored_values.md` writes the page.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def main() -> None:
     if given.markdown is not None:
         command = (
             f"python -m pipelines.experiments.stored_values --voyages {given.voyages} "
-            f"--seed {given.seed} --markdown docs/stored_values.md"
+            f"--seed {given.seed} --markdown docs/evidence/stored_values.md"
         )
         given.markdown.write_text(f"{TITLE.format(command=command)}{text}", encoding="utf-8")
     print(text)

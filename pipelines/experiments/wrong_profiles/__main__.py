@@ -2,7 +2,8 @@
 
     python -m pipelines.experiments.wrong_profiles
     python -m pipelines.experiments.wrong_profiles --diagnose --out OUT --only "wind"
-    python -m pipelines.experiments.wrong_profiles --diagnose --markdown docs/wrong_profiles.md
+    python -m pipelines.experiments.wrong_profiles --diagnose \
+        --markdown docs/evidence/wrong_profiles.md
 
 Each is tried in three ways: in both campaigns, in the trial only, in the profile of one voyage.
 Without --diagnose the voyages are ingested and nothing is trained; with it, a model of the right

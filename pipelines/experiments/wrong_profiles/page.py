@@ -14,7 +14,8 @@ from shiplog.report.evaluation.text_table import table
 
 HEAD = """# Profiles with one thing wrong
 
-    python -m pipelines.experiments.wrong_profiles --diagnose --markdown docs/wrong_profiles.md
+    python -m pipelines.experiments.wrong_profiles --diagnose \\
+        --markdown docs/evidence/wrong_profiles.md
 
 Each of these {count} profiles of the sample ship has one wrong unit, sign or place; the first 22
 are those that a new user tried. The sample logs are read through it in three ways: both campaigns

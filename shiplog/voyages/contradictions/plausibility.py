@@ -64,7 +64,8 @@ DEGREES = ((math.pi / 180.0, "degrees that are called rad"),)
 RADIANS = ((180.0 / math.pi, "radians that are called deg"),)
 SHIP_KEYS = ("ship.mass_kg", "ship.length_m", "ship.breadth_m", "ship.draught_m")
 
-# Each limit with the reason for it. `usual` holds the sound ships of docs/measured_ships.md.
+# Each limit with the reason for it. `usual` holds the sound ships of
+# docs/evidence/measured_ships.md.
 TABLE: dict[str, Limit] = {
     "displacement": Limit(
         "displacement ratio m/(rho L B T)", "1", (0.05, 1.0), (0.01, 1.0), SHIP_KEYS,
