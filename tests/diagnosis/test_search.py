@@ -43,13 +43,14 @@ def test_a_hidden_cause_is_found_and_sized(one):
 def test_a_cause_whose_fit_diverges_is_no_answer(monkeypatch):
     """Where it is linearised it explains much, and no fit of it holds: neither a name nor a
     probability is left of that, and the reason is reported."""
-    before = weighing.converge
+    before = weighing.resume
 
-    def diverges(trial, included, numbers, *more, **others):
-        point, found = before(trial, included, numbers, *more, **others)
-        return point, replace(found, evidence=-math.inf) if "drag" in included else found
+    def diverges(trial, included, *more, **others):
+        fit = before(trial, included, *more, **others)
+        gone = replace(fit, found=replace(fit.found, evidence=-math.inf))
+        return gone if "drag" in included else fit
 
-    monkeypatch.setattr(weighing, "converge", diverges)
+    monkeypatch.setattr(weighing, "resume", diverges)
     made = searched({"drag": [1.2]})
     assert made.diverged == {"drag"} and made.scanned["drag"] > 20.0
     decision, found = decide(made)

@@ -25,7 +25,7 @@ from shiplog.diagnosis.trial.fitted import Fit
 def test_the_factor_of_a_change_is_the_difference_of_two_evidences(trial, family, included):
     point = trial.at({})
     base = level(trial, point, 1.4, included)
-    gained, size = fits.changed(trial, point, base, included, family, Remainder())
+    gained, size = evidence.family_change(trial, point, base, included, family, Remainder())
     each = [level(trial, point, 1.4, included, family, s).value for s in remainder.CHANGE_SIZES]
     assert gained == pytest.approx(max(each) - base.value, abs=1e-6)
     assert size == remainder.CHANGE_SIZES[int(np.argmax(each))]
@@ -49,7 +49,8 @@ def test_a_change_that_is_there_is_found_at_its_size(made):
     point = trial.at({})
     base = level(trial, point, 1.0)
     gained = {
-        name: fits.changed(trial, point, base, (), name, Remainder()) for name in trial.families
+        name: evidence.family_change(trial, point, base, (), name, Remainder())
+        for name in trial.families
     }
     best = max(gained, key=lambda name: gained[name][0])
     assert best == "position"
@@ -72,7 +73,7 @@ def test_a_change_acts_on_the_channels_of_its_acceleration(made):
     trial = straight.trial(nominal, record, given)
     point = trial.at({})
     base, _ = evidence.scan(trial, point, (), (), 1.0)
-    assert fits.acts_on(trial, Fit(point, base, Remainder(RAISED)), "time") == ("sway",)
+    assert fits.channels_changed(trial, Fit(point, base, Remainder(RAISED)), "time") == ("sway",)
 
 
 @pytest.mark.parametrize(
@@ -95,10 +96,10 @@ def test_what_a_family_does_as_well_is_the_share_that_lies_in_its_columns(made, 
     point = trial.at({})
     base, _ = evidence.scan(trial, point, (), ("drag",), 1.0)
     base.numbers["drag"] = np.ones(1)
-    share = fits.imitated(trial, Fit(point, base, Remainder("time")), "drag", 1e4)
+    share = fits.share_imitated(trial, Fit(point, base, Remainder("time")), "drag", 1e4)
     assert low <= share <= high
-    assert fits.imitated(trial, Fit(point, base, Remainder("time")), "drag", 1e-4) < 0.01
-    assert fits.imitated(trial, Fit(point, base, Remainder(RAISED)), "drag", 1e4) == 0.0
+    assert fits.share_imitated(trial, Fit(point, base, Remainder("time")), "drag", 1e-4) < 0.01
+    assert fits.share_imitated(trial, Fit(point, base, Remainder(RAISED)), "drag", 1e4) == 0.0
 
 
 # --- levels of process noise
@@ -180,16 +181,17 @@ def test_a_fit_that_diverges_with_raised_noise_leaves_no_noise_to_explain(
     """The first or the second fit of a set diverges, with numbers that are not finite: neither a
     factor of each channel nor a force is asked of it, and the set stays with raised noise."""
     trial, point = evidence.begin(straight.trial(*made), {})
-    table, real, count = Hypotheses(trial, point, {}), weighing.converge, 0
+    table, real, count = Hypotheses(trial, point, {}), weighing.resume, 0
     monkeypatch.setattr(weighing, "RAISED_FROM", 0.0)
 
-    def diverges(trial, included, numbers, *more, **others):
+    def diverges(trial, included, remainder, *more, **others):
         nonlocal count
-        count += len(others)  # its remainder, but for the fit that a set begins with
-        at, found = real(trial, included, numbers, *more, **others)
-        if count >= failing:
-            found = replace(found, evidence=-math.inf, numbers={"drag": np.array([np.nan])})
-        return at, found
+        count += remainder != weighing.RAISING  # not the fit that a set begins with
+        fit = real(trial, included, remainder, *more, **others)
+        if count < failing:
+            return fit
+        gone = {"drag": np.array([np.nan])}
+        return replace(fit, found=replace(fit.found, evidence=-math.inf, numbers=gone))
 
     def asked(fit):
         assert np.isfinite([*fit.found.numbers.values()]).all()
@@ -198,7 +200,7 @@ def test_a_fit_that_diverges_with_raised_noise_leaves_no_noise_to_explain(
     table.intermittent = asked
     monkeypatch.setattr(table, "nominal_side_force", None, raising=False)
     weighing.weigh(table, (), {}, point)
-    monkeypatch.setattr(weighing, "converge", diverges)
+    monkeypatch.setattr(weighing, "resume", diverges)
     weighing.weigh(table, ("drag",), {"drag": np.zeros(1)}, point)
     assert count >= failing
     assert np.isfinite(table.found[("drag",), RAISED].evidence)

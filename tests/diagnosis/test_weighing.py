@@ -8,7 +8,7 @@ import pytest
 import straight
 from searchable import raised_noise, search_of, trial_with
 
-from shiplog.diagnosis.hypotheses import evidence, fits, weighing
+from shiplog.diagnosis.hypotheses import evidence, weighing
 from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
 from shiplog.diagnosis.hypotheses.weighing import weigh
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
@@ -16,7 +16,7 @@ from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED, Rem
 
 def test_an_intermittent_force_is_tested_with_no_family(monkeypatch):
     """Where the process noise is raised, whatever was tried before it."""
-    asked, real = [], fits.changed
+    asked, real = [], evidence.family_change
 
     def no_force(fit):
         asked.append(fit.remainder)
@@ -27,7 +27,7 @@ def test_an_intermittent_force_is_tested_with_no_family(monkeypatch):
         asked.clear()
         trial, point = trial_with({}, accelerations=more)
         monkeypatch.setattr(
-            fits, "changed", lambda *given, gain=gain, last=last: (
+            evidence, "family_change", lambda *given, gain=gain, last=last: (
                 (gain, 3.0) if given[4] == last else real(*given)
             )
         )  # fmt: skip
@@ -136,7 +136,7 @@ def test_with_raised_noise_a_family_counts_where_it_alone_is_likelier_than_the_n
     """What gains a little together with noise that explains much is fitted to that noise."""
     trial, point = trial_with({}, accelerations=raised_noise())
     trial = replace(trial, campaign=replace(trial.campaign, noise=0.05))  # parts of the same noise
-    monkeypatch.setattr(fits, "changed", lambda *given: (gain, 3.0))
+    monkeypatch.setattr(evidence, "family_change", lambda *given: (gain, 3.0))
     levels = weighing.nominal_levels(trial, point, (), 1.0)
     raised = max(level.value for level in levels)
     quiet = weighing.best(trial, levels, NOMINAL).value

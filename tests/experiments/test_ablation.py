@@ -83,7 +83,7 @@ def test_every_part_that_can_be_taken_out_is_there_and_comes_back(part):
         "robust-weights": (campaign_characteristics, "robust_weights"),
         "refutation": (refutation, "judged"), "baseline": (baseline_check, "lacking"),
         "practical-size": (posterior, "practical"), "share-of-causes": (thresholds, "MOST"),
-        "time-scale": (trial_voyages, "in_ship_time"), "imitation": (without.fits, "imitated"),
+        "time-scale": (trial_voyages, "in_ship_time"), "imitation": (without.fits, "share_imitated"),
         "spectrum": (thresholds, "SPECTRUM"), "slight": (thresholds, "SLIGHT"),
         "ordinary-noise": (thresholds, "ORDINARY_NOISE"),
         "ordinary-spreads": (thresholds, "ORDINARY_SPREADS"), "pattern": (posterior, "device"),

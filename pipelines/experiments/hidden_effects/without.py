@@ -132,7 +132,7 @@ def _no_share_of_causes(stack: ExitStack) -> None:
 
 def _no_imitation(stack: ExitStack) -> None:
     """A cause is named though the remainder next to it could do most of what it does."""
-    stack.enter_context(patch.object(fits, "imitated", lambda *given: 0.0))
+    stack.enter_context(patch.object(fits, "share_imitated", lambda *given: 0.0))
 
 
 def _none_slight(stack: ExitStack) -> None:

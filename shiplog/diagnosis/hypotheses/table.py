@@ -135,8 +135,8 @@ class Hypotheses:
         return intermittent.side_force(self.trial, fit, self.nominal_side_force)
 
     def with_pattern(self, fit: Fit, side_force: SideForce) -> SideForce:
-        """As `intermittent.with_pattern`."""
-        return intermittent.with_pattern(self.trial, fit, side_force)
+        """As `intermittent.add_pattern`."""
+        return intermittent.add_pattern(self.trial, fit, side_force)
 
     def raised_by_channel(self, fit: Fit) -> Remainder:
         """Process noise raised in each channel by itself, as a hypothesis leaves it."""

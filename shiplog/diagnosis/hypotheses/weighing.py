@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shiplog.diagnosis import thresholds
-from shiplog.diagnosis.hypotheses import evidence, fits, unrecorded_thruster
+from shiplog.diagnosis.hypotheses import evidence, unrecorded_thruster
+from shiplog.diagnosis.hypotheses.evaluate import resume
 from shiplog.diagnosis.hypotheses.hypothesis import Hypothesis
-from shiplog.diagnosis.hypotheses.relinearisation import converge
 from shiplog.diagnosis.hypotheses.table import Hypotheses
 from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder, noise_prior
-from shiplog.diagnosis.trial.fitted import Fit, Found, Level, Point
+from shiplog.diagnosis.trial.fitted import Fit, Found, Level, Point, Start
 from shiplog.diagnosis.trial.trial import Trial
 
 SEARCH_NATS = 10.0  # nats behind the best, beyond which a hypothesis is not worth a linearisation
@@ -93,10 +93,10 @@ def weigh(
     if labels:
         lowest = table.nothing.evidence - FAILED_NATS
         both = table.fixed | dict(numbers)
-        point, base = converge(trial, included, both, at.path, lowest, RAISING)
-        if not math.isfinite(base.evidence):
+        fit = resume(trial, included, RAISING, Start(both, at.path), lowest)
+        if fit.diverged:
             return
-        near = base.noise_factor
+        point, near = fit.point, fit.found.noise_factor
     levels = evidence.levels(trial, point, included, near, RAISING)
     if near is not None and near > RAISED_FROM:  # the noise may be nominal again
         levels.append(evidence.level(trial, point, 1.0, included, RAISING))
@@ -125,8 +125,7 @@ def weigh_as(table: Hypotheses, labels: tuple[str, ...], one: Hypothesis, fit: F
         return False
     numbers = {name: fit.found.numbers[name] for name in table.included(labels)}
     start = replace(fit, found=replace(fit.found, numbers=numbers))
-    table.trial.converged.pop((table.included(labels), one.remainder), None)  # begin there
-    again = _fitted_with(table, labels, start, one.remainder)
+    again = _fitted_with(table, labels, start, one.remainder, anew=True)
     before = table.found.get((labels, one.kind))
     least = -math.inf if before is None else before.evidence + evidence.LITTLE_NATS
     if again.diverged or again.found.evidence < least:
@@ -161,12 +160,12 @@ def rougher(table: Hypotheses, labels: tuple[str, ...], plain: Rough) -> Rough:
     return shaped if shaped.best.value > plain.best.value else plain
 
 
-def _fitted_with(table: Hypotheses, labels: tuple[str, ...], fit: Fit, remainder: Remainder) -> Fit:
+def _fitted_with(
+    table: Hypotheses, labels: tuple[str, ...], fit: Fit, remainder: Remainder, anew: bool = False
+) -> Fit:
     """The same causes with another remainder."""
-    point, found = converge(
-        table.trial, table.included(labels), fit.found.numbers, fit.point.path, remainder=remainder
-    )
-    return Fit(point, found, remainder)
+    start = Start(fit.found.numbers, fit.point.path)
+    return resume(table.trial, table.included(labels), remainder, start, anew=anew)
 
 
 def nominal_levels(
@@ -214,7 +213,9 @@ def changed(
         """Log evidence, size of the change, λ at each level, which are made under `raised`."""
         found = []
         for level in of.levels:
-            gained, size = fits.changed(trial, of.point, level, included, family, of.remainder)
+            gained, size = evidence.family_change(
+                trial, of.point, level, included, family, of.remainder
+            )
             found.append((level.value + gained, size, level.noise_factor))
         return found
 
@@ -253,9 +254,9 @@ def _weigh_change(
         return
     here, _ = evidence.scan(trial, one.point, (), included, one.noise, remainder)
     if labels:
-        again, base = converge(trial, included, here.numbers, one.point.path, remainder=remainder)
-        if math.isfinite(base.evidence) and base.evidence > one.value:
-            table.put(labels, base.evidence, Fit(again, base, remainder))
+        again = resume(trial, included, remainder, Start(here.numbers, one.point.path))
+        if not again.diverged and again.found.evidence > one.value:
+            table.put(labels, again.found.evidence, again)
             return
     table.put(labels, max(one.value, here.evidence), Fit(one.point, here, remainder))
 

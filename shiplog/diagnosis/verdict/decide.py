@@ -105,7 +105,7 @@ def _imitated(
             continue
         if not posteriors.slight(table, best, name):
             size = _size_without(table, fit.remainder, name)
-            share = fits.imitated(table.trial, fit, label, size)
+            share = fits.share_imitated(table.trial, fit, label, size)
             shares[name] = max(share, shares.get(name, 0.0))
     return {
         name: f"what remains unknown could do {share:.0%} of it as well"
@@ -177,7 +177,7 @@ def _structure(table: Hypotheses, best: Hypothesis, fit: Fit) -> Structure:
     if family in (STOCHASTIC, INTERMITTENT):
         channels = EVERYWHERE if family == STOCHASTIC else EVERYWHERE[1:]
         return Structure(family, gained, channels)
-    return Structure(family, gained, fits.acts_on(table.trial, fit, best.kind))
+    return Structure(family, gained, fits.channels_changed(table.trial, fit, best.kind))
 
 
 def _with_side_force(fit: Fit, side_force: SideForce) -> Fit:

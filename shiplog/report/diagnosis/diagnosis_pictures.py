@@ -75,7 +75,7 @@ def _residual(done: DiagnosedTrial) -> tuple[pl.DataFrame, tuple[str, ...]]:
     nominal = ref.mean * ref.columns.unit
     process_noise = trial.process_noise(nothing.remainder, whole.cut)
     process_noise = process_noise.times(nothing.found.noise_factor)
-    found = residual_acceleration.posterior(*trial.left(whole, nominal), process_noise, record)
+    found = residual_acceleration.posterior(*trial.less_misfit(whole, nominal), process_noise, record)
     keep = residual_acceleration.once(found)
     order = np.argsort(found.rows[keep])
     rows = found.rows[keep][order]
