@@ -97,4 +97,4 @@ def test_a_cause_next_to_an_intermittent_force_has_to_gain_more_than_the_force_l
     table.found = {key: SimpleNamespace(evidence=value) for key, value in evidence.items()}
     for kind, left in ((INTERMITTENT, 0.4), (RAISED, 0.0), (NOMINAL, 0.0)):
         prior = table.priors.of(("drag",), kind)
-        assert table.score(990.0, ("drag",), kind) == pytest.approx(990.0 + prior - left)
+        assert table.scale.score(990.0, ("drag",), kind) == pytest.approx(990.0 + prior - left)

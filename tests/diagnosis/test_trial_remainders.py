@@ -8,10 +8,10 @@ import pytest
 import straight
 from dense_trial import SHARE, gaussian, level, nats, of_noise
 from scipy.stats import multivariate_normal, norm
+from searchable import search_of
 from straight import CAUSES, PROCESS_NOISE
 
 from shiplog.diagnosis.hypotheses import evidence, fits, weighing
-from shiplog.diagnosis.hypotheses.table import Hypotheses
 from shiplog.diagnosis.noise import remainder
 from shiplog.diagnosis.noise.discrepancy import EVEN
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, RAISED, Remainder
@@ -181,7 +181,7 @@ def test_a_fit_that_diverges_with_raised_noise_leaves_no_noise_to_explain(
     """The first or the second fit of a set diverges, with numbers that are not finite: neither a
     factor of each channel nor a force is asked of it, and the set stays with raised noise."""
     trial, point = evidence.begin(straight.trial(*made), {})
-    table, real, count = Hypotheses(trial, point, {}), weighing.resume, 0
+    real, count = weighing.resume, 0
     monkeypatch.setattr(weighing, "RAISED_FROM", 0.0)
 
     def diverges(trial, included, remainder, *more, **others):
@@ -197,11 +197,11 @@ def test_a_fit_that_diverges_with_raised_noise_leaves_no_noise_to_explain(
         assert np.isfinite([*fit.found.numbers.values()]).all()
         return straight.no_hull(fit)
 
-    table.intermittent = asked
-    monkeypatch.setattr(table, "nominal_side_force", None, raising=False)
-    weighing.weigh(table, (), {}, point)
+    search = search_of(trial, point, estimate=asked)
+    search.weigh((), {}, point)
     monkeypatch.setattr(weighing, "resume", diverges)
-    weighing.weigh(table, ("drag",), {"drag": np.zeros(1)}, point)
+    search.weigh(("drag",), {"drag": np.zeros(1)}, point)
+    table = search.table
     assert count >= failing
     assert np.isfinite(table.found[("drag",), RAISED].evidence)
     assert (("drag",), INTERMITTENT) not in table.found

@@ -33,7 +33,7 @@ from pipelines.experiments.hidden_effects.run import Settings
 from shiplog import cli
 from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.hypotheses import evidence, fits
-from shiplog.diagnosis.hypotheses.table import Hypotheses
+from shiplog.diagnosis.hypotheses.intermittent import ResidualNoise
 from shiplog.diagnosis.noise import discrepancy
 from shiplog.diagnosis.noise.remainder import INTERMITTENT
 from shiplog.diagnosis.nominal import (
@@ -51,7 +51,7 @@ from shiplog.models.causes import CATALOGUE
 
 def _no_placebo(stack: ExitStack) -> None:
     stack.enter_context(patch.object(placebo, "placebos", lambda campaign: {}))
-    stack.enter_context(patch.object(Hypotheses, "nominal_side_force", None))
+    stack.enter_context(patch.object(ResidualNoise, "nominal", None))
 
 
 def _no_form_error(stack: ExitStack) -> None:

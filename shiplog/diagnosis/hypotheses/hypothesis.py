@@ -15,6 +15,8 @@ from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED, Rem
 from shiplog.diagnosis.trial.fitted import Found, Point
 from shiplog.models.causes import Cause
 
+Key = tuple[tuple[str, ...], str]  # causes by label, in alphabetical order, and kind of remainder
+
 
 @dataclass(frozen=True)
 class Place:

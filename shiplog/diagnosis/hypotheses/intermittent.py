@@ -12,7 +12,8 @@ The acceleration a at the nodes of a segment is process noise n and that of the 
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -36,6 +37,38 @@ KNOWN = 2.0  # standard deviations of the estimate: a weaker force shows no patt
 COMES_AND_GOES = 0.5  # of the time: what is on for longer is no device that comes and goes
 NO_NOISE = 1e-9  # of the process noise, that leaves the intermittent force by itself
 VARIES = 1.0  # time between over time on, from which a force merely varies: a Gaussian one has 1.13
+
+
+@dataclass(frozen=True)
+class ResidualNoise:
+    """Estimates of the noise that explains the residual of a fit.
+
+    at_one_place  whether nominal process noise that acts at one place is looked for: it is then
+                  raised with the rest
+    """
+
+    trial: Trial
+    at_one_place: bool = True
+
+    @cached_property
+    def nominal(self) -> Remainder | None:
+        """As `nominal_side_force`."""
+        if not self.at_one_place:
+            return None
+        return nominal_side_force(self.trial.campaign, self.trial.grid)
+
+    def raised(self, fit: Fit) -> Remainder:
+        """Process noise raised in each channel by itself."""
+        return raised_noise.by_channel(noise_left(self.trial, fit), self.nominal)[1]
+
+    def side_force(self, fit: Fit) -> SideForce:
+        """As `side_force`, with its log Bayes factor over raised noise, whose nominal part acts at
+        one place too."""
+        return side_force(self.trial, fit, self.nominal)
+
+    def add_pattern(self, fit: Fit, force: SideForce) -> SideForce:
+        """As `add_pattern`."""
+        return add_pattern(self.trial, fit, force)
 
 
 def nominal_side_force(campaign: Campaign, g: SegmentGrid) -> Remainder | None:
