@@ -13,6 +13,7 @@ from shiplog.cli.output import LOST, answer
 
 
 def diagnose(
+    context: typer.Context,
     run: Annotated[Path, typer.Argument(help="A trained run, such as runs/mmg.")],
     voyages: TrialVoyages = None,
     store: StoreOption = STORE,
@@ -43,10 +44,12 @@ def diagnose(
 
     with loading():
         from shiplog.commands.diagnose import diagnose_command
+        from shiplog.diagnosis.parts import ALL
 
     found = diagnose_command(
-        store, run, voyages=voyages or [], out=out, extend=extend, cause_files=cause or []
-    )
+        store, run, voyages=voyages or [], out=out, extend=extend, cause_files=cause or [],
+        switches=context.obj or ALL,
+    )  # fmt: skip
     answer(found.text, found.content, json_to)
     if not found.complete:
         raise typer.Exit(LOST)

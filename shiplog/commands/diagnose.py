@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from shiplog.commands.bars import reach, staged
 from shiplog.diagnosis.linear import segments
+from shiplog.diagnosis.parts import ALL, Parts
 from shiplog.diagnosis.residual import error_location
 from shiplog.diagnosis.trial import trial_voyages
 from shiplog.diagnosis.verdict import (
@@ -39,7 +40,7 @@ from shiplog.training.runs.load_model import Run
 from shiplog.training.runs.provenance import Answer, provenance
 from shiplog.training.runs.run_checks import refuse_other_ship
 from shiplog.voyages.rows.recording import Record
-from shiplog.voyages.store import contradicted, parts
+from shiplog.voyages.store import contradicted
 from shiplog.voyages.store.contradicted import Contradicted
 from shiplog.voyages.store.store import Store
 from shiplog.voyages.windows.windows import Windows
@@ -66,8 +67,9 @@ def diagnose_run(
     *,
     extend: Path | None = None,
     cause_files: Sequence[Path] = (),
+    switches: Parts = ALL,
 ) -> DiagnosedTrial:
-    """The whole way. Raises ShiplogError."""
+    """The whole way; the `switches` say which parts of the decision act. Raises ShiplogError."""
     began = time.time()
     check_diagnosis(out, extend)
     causes = user.load(cause_files)
@@ -78,7 +80,8 @@ def diagnose_run(
     recorded = trial_voyages.record_of(store, names, profile)
     before_effect = not parts.overlapping(names, run.trained_on) and not run.given
     nominal = _nominal(run, store, profile) if before_effect else None
-    nominal, recorded = trial_voyages.in_ship_time(run, nominal, recorded)
+    if switches.time_scale:
+        nominal, recorded = trial_voyages.in_ship_time(run, nominal, recorded)
     used = [*names, *store.there(run.trained_on)]
     against = contradicted.of(store, dict.fromkeys(used))
     if contradicted.everywhere(against):
@@ -86,7 +89,9 @@ def diagnose_run(
     elif answer.enough(recorded):
         if nominal is not None and len(segments.begins(nominal)) < NOMINAL:
             nominal = None
-        campaign = Campaigns(run, store, names, profile, recorded, nominal, before_effect, against)
+        campaign = Campaigns(
+            run, store, names, profile, recorded, nominal, before_effect, against, switches
+        )
         done = _decided(campaign, out, causes)
     else:
         done = DiagnosedTrial(answer.too_little(run, recorded, before_effect), out)
@@ -113,6 +118,7 @@ class Campaigns:
     nominal: Record | None
     before_effect: bool
     against: Sequence[Contradicted] = ()
+    switches: Parts = ALL
 
 
 def _decided(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTrial:
@@ -141,10 +147,12 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
             return DiagnosedTrial(
                 answer.other_convention(run, recorded, before_effect, why, of.against, notes), out
             )
-    lacking = baseline_check.lacking(run, store, profile) if nominal is not None else run.lacks
+    lacking = run.lacks
+    if nominal is not None:
+        lacking = baseline_check.lacking(run, store, profile) if of.switches.baseline else ""
     barred = contradicted_causes.barred(contradicted.channels(of.against), profile)
     decided = trial_decision.decided(
-        run, nominal, recorded, cut, causes, lacking, reach, barred, before, profile
+        run, nominal, recorded, cut, causes, lacking, reach, barred, before, profile, of.switches
     )
     tried, judge = decided.trial, decided.judge
     decision, found, dropped = decided.decision, decided.gain, dict(decided.refuted)
@@ -260,10 +268,11 @@ def diagnose_command(
     out: Path,
     extend: Path | None,
     cause_files: Sequence[Path],
+    switches: Parts = ALL,
 ) -> Answer:
-    """`shiplog diagnose`."""
+    """`shiplog diagnose`; an experiment hands in which parts of the decision act."""
     done = diagnose_run(
-        run, Store(store_path), voyages, out, extend=extend, cause_files=cause_files
+        run, Store(store_path), voyages, out, extend=extend, cause_files=cause_files, switches=switches
     )
     text = f"{page.markdown(done.verdict)}\nReport: {out / 'report.md'}"
     content = done.verdict.as_json()

@@ -198,7 +198,7 @@ def test_a_cause_that_the_remainder_imitates_is_not_named_with_it(trial, monkeyp
         asked.append((label, fit.remainder.kind))
         return share
 
-    monkeypatch.setattr(fits, "share_imitated", imitated)
+    monkeypatch.setattr(fits, "imitated", imitated)
     sure = {(DRAG, "time"): 0.96, (DRAG, NOMINAL): 0.02, ((), NOMINAL): 0.02}
     found = verdict(trial, sure, evidence={(DRAG, "time"): 80.0, (DRAG, NOMINAL): 70.0})
     assert found.verdict == word
@@ -215,7 +215,7 @@ def test_a_cause_that_the_remainder_imitates_puts_no_other_in_doubt(
     """The other is named where it explains most by itself, without the one in doubt."""
     both = ("drag", "load")
     shares = {"drag": 0.1, "load": 0.8}
-    monkeypatch.setattr(fits, "share_imitated", lambda trial, fit, label, size: shares[label])
+    monkeypatch.setattr(fits, "imitated", lambda trial, fit, label, size: shares[label])
     sure = {(both, "time"): 0.96, (DRAG, NOMINAL): 0.02, (both, NOMINAL): 0.02}
     evidence = {(both, "time"): 80.0, (both, NOMINAL): 70.0, (DRAG, NOMINAL): alone}
     found = verdict(trial, sure, evidence=evidence)
@@ -230,7 +230,7 @@ def test_a_slight_remainder_may_do_the_work_of_a_slight_cause(trial, monkeypatch
     it, by their form."""
     both = ("drag", "load")
     shares = {"drag": 0.9, "load": 0.9}
-    monkeypatch.setattr(fits, "share_imitated", lambda trial, fit, label, size: shares[label])
+    monkeypatch.setattr(fits, "imitated", lambda trial, fit, label, size: shares[label])
     sure = {(both, "time"): 0.96, (both, NOMINAL): 0.03, (DRAG, NOMINAL): 0.01}
     evidence = {(both, "time"): 101.5, (both, NOMINAL): 100.0, (DRAG, NOMINAL): alone}
     assert named(verdict(trial, sure, evidence=evidence)) == names
@@ -239,9 +239,7 @@ def test_a_slight_remainder_may_do_the_work_of_a_slight_cause(trial, monkeypatch
 def test_the_remainder_is_as_large_as_it_would_be_without_the_cause(trial, monkeypatch):
     """Next to the cause it is only what the cause leaves of an unknown force."""
     asked = []
-    monkeypatch.setattr(
-        fits, "share_imitated", lambda trial, fit, label, size: asked.append(size) or 0.0
-    )
+    monkeypatch.setattr(fits, "imitated", lambda trial, fit, label, size: asked.append(size) or 0.0)
     sure = {(DRAG, "time"): 0.97, (DRAG, NOMINAL): 0.02, ((), "time"): 0.01}
     made = weighed.search(trial, sure, evidence={(DRAG, "time"): 80.0, (DRAG, NOMINAL): 70.0})
     found = made.table.found

@@ -73,7 +73,7 @@ def test_a_change_acts_on_the_channels_of_its_acceleration(made):
     trial = straight.trial(nominal, record, given)
     point = trial.at({})
     base, _ = evidence.scan(trial, point, (), (), 1.0)
-    assert fits.channels_changed(trial, Fit(point, base, Remainder(RAISED)), "time") == ("sway",)
+    assert fits.acts_on(trial, Fit(point, base, Remainder(RAISED)), "time") == ("sway",)
 
 
 @pytest.mark.parametrize(
@@ -96,10 +96,10 @@ def test_what_a_family_does_as_well_is_the_share_that_lies_in_its_columns(made, 
     point = trial.at({})
     base, _ = evidence.scan(trial, point, (), ("drag",), 1.0)
     base.numbers["drag"] = np.ones(1)
-    share = fits.share_imitated(trial, Fit(point, base, Remainder("time")), "drag", 1e4)
+    share = fits.imitated(trial, Fit(point, base, Remainder("time")), "drag", 1e4)
     assert low <= share <= high
-    assert fits.share_imitated(trial, Fit(point, base, Remainder("time")), "drag", 1e-4) < 0.01
-    assert fits.share_imitated(trial, Fit(point, base, Remainder(RAISED)), "drag", 1e4) == 0.0
+    assert fits.imitated(trial, Fit(point, base, Remainder("time")), "drag", 1e-4) < 0.01
+    assert fits.imitated(trial, Fit(point, base, Remainder(RAISED)), "drag", 1e4) == 0.0
 
 
 # --- levels of process noise

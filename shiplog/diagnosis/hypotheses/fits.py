@@ -97,7 +97,7 @@ def less_parts(trial: Trial, linear: Linear, fit: Fit) -> Linear:
     return linear.less_numbers(b, accelerations)
 
 
-def share_imitated(trial: Trial, fit: Fit, label: str, size: float) -> float:
+def imitated(trial: Trial, fit: Fit, label: str, size: float) -> float:
     """Share, 0 to 1, of what a cause does to the observations that a change of the weights of the
     remainder's family does as well, the campaign's own numbers free.
 
@@ -129,7 +129,7 @@ def share_imitated(trial: Trial, fit: Fit, label: str, size: float) -> float:
     return float(g @ np.linalg.solve(M_ww, g) / whole) if whole > 0.0 else 1.0
 
 
-def channels_changed(trial: Trial, fit: Fit, family: str) -> tuple[str, ...]:
+def acts_on(trial: Trial, fit: Fit, family: str) -> tuple[str, ...]:
     """Channels on which a change of a family's weights acts: where the standard deviation of its
     acceleration W w, over that of the process noise, is near the largest."""
     changed_by = replace(fit.remainder, kind=family, size=CHANGE_SIZES[1], noisy=False)

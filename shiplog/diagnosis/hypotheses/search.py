@@ -22,6 +22,7 @@ from shiplog.diagnosis.hypotheses.intermittent import ResidualNoise
 from shiplog.diagnosis.hypotheses.table import Hypotheses, rescored, shortened
 from shiplog.diagnosis.hypotheses.weighing import SEARCH_NATS, CauseSet, weigh, weigh_as
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED
+from shiplog.diagnosis.parts import ALL, Parts
 from shiplog.diagnosis.trial.fitted import ExpectedEvidence, Fit, Point
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.models.causes import Cause
@@ -50,9 +51,10 @@ class Search:
     def __init__(
         self, trial: Trial, point: Point, placebo: Mapping[str, float],
         likely: Mapping[str, np.ndarray] | None = None, noise: ResidualNoise | None = None,
+        parts: Parts = ALL,
     ) -> None:  # fmt: skip
-        self.table = Hypotheses(trial, point, placebo)
-        self.noise = noise or ResidualNoise(trial)
+        self.table = Hypotheses(trial, point, placebo if parts.placebo else {}, parts=parts)
+        self.noise = noise or ResidualNoise(trial, at_one_place=parts.placebo)
         self.likely = dict(likely or {})
         self.expected: dict[str, ExpectedEvidence] = {}
         self.scanned: dict[str, float] = {}
@@ -107,6 +109,7 @@ class Search:
             nothing=None if nothing is None else nothing.evidence,
             raised=table.found.best(RAISED, table.banned),
             intermittent=table.found.best(INTERMITTENT, table.banned),
+            spectrum=table.parts.spectrum,
         )  # fmt: skip
 
     def weigh(self, labels: tuple[str, ...], numbers: Mapping[str, np.ndarray], at: Point) -> None:

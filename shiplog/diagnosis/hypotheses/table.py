@@ -17,6 +17,7 @@ from shiplog.diagnosis.hypotheses.hypothesis import (
 )
 from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED
+from shiplog.diagnosis.parts import ALL, Parts
 from shiplog.diagnosis.trial.fitted import Fit, Point
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.models.causes import Cause
@@ -52,6 +53,7 @@ class Scale:
     by       label → cause of the catalogue
     alone    label → log Bayes factor of that cause by itself, over no cause
     force_alone   log Bayes factor of an intermittent force without a cause, over nothing
+    form_errors   whether the equations of a cause, or of a force, have errors
     """
 
     priors: Priors
@@ -59,12 +61,15 @@ class Scale:
     by: Mapping[str, Cause]
     alone: Mapping[str, float]
     force_alone: float
+    form_errors: bool = True
 
     def score(self, evidence: float, labels: Sequence[str], kind: str) -> float:
         """Log posterior (15), in nats, up to a constant."""
         misfit = sum(self.placebo.get(n, 0.0) for n in labels) + self.placebo.get(kind, 0.0)
         force = self.force_alone if kind == INTERMITTENT else 0.0
-        allowance = form_error(self.alone, labels, self.by, force)
+        allowance = 0.0
+        if self.form_errors:
+            allowance = form_error(self.alone, labels, self.by, force)
         return evidence + self.priors.of(labels, kind) - misfit - allowance
 
     def hypothesis(
@@ -84,6 +89,7 @@ class Hypotheses:
     found      causes and kind of remainder → hypothesis
     alone      label → log Bayes factor of that cause by itself, over no cause
     banned     sets of names: a hypothesis that holds all names of one does not count any more
+    parts      of the decision, that act
     catalogue  causes that a hypothesis may contain in addition to those of the model
     by         label → cause of the catalogue
     """
@@ -94,6 +100,7 @@ class Hypotheses:
     found: Table = field(default_factory=Table)
     alone: dict[str, float] = field(default_factory=dict)
     banned: set[frozenset[str]] = field(default_factory=set)
+    parts: Parts = ALL
 
     def __post_init__(self) -> None:
         causes = self.trial.reference.model.causes
@@ -116,7 +123,8 @@ class Hypotheses:
         intermittent force is kept with causes only, raised noise was as probable without one."""
         alone = self.found.get(((), INTERMITTENT), self.found.get(((), RAISED)))
         force = 0.0 if alone is None else alone.evidence - self.nothing.evidence
-        return Scale(self.priors, self.placebo, self.by, dict(self.alone), force)
+        errors = self.parts.form_error
+        return Scale(self.priors, self.placebo, self.by, dict(self.alone), force, errors)
 
     def ranked(self, without: str = "") -> list[Hypothesis]:
         """Best first, of those that are not banned; without those that contain a cause of this

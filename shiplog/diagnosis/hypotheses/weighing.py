@@ -50,6 +50,7 @@ class CauseSet:
     nothing       log evidence of no cause; None where it is that set
     raised        the most probable hypothesis so far with raised process noise
     intermittent  the same with an intermittent force
+    spectrum      whether a change of a family has to explain some of raised noise
     """
 
     trial: Trial
@@ -59,6 +60,7 @@ class CauseSet:
     nothing: float | None = None
     raised: Hypothesis | None = None
     intermittent: Hypothesis | None = None
+    spectrum: bool = True
 
     @property
     def included(self) -> tuple[str, ...]:
@@ -267,7 +269,8 @@ def change(plain: Rough, rough: Rough, family: str) -> Change:
     nominal = [(v - raised_over_nominal(trial, noise), s, noise) for v, s, noise in tried(plain)]
     noisy = max(nominal)[0] > plain.best.value
     value, size, noise = max(tried(rough) if noisy else nominal)
-    if plain.raises and value - rough.best.value < rough.spectrum():
+    least = rough.spectrum() if plain.of.spectrum else 0.0
+    if plain.raises and value - rough.best.value < least:
         value = -math.inf
     if not noisy:
         return Change(plain.point, Remainder(family, size), value, noise)

@@ -49,12 +49,13 @@ def decide(
     kind = found.remainder
     best = posteriors.best_with(found, names, kind if not names else None)
     fit = table.fit(best)
-    one_device, remains = posteriors.device(best), posteriors.practical_kind(table, best)
+    one_device = posteriors.device(best, table.parts.pattern)
+    remains = posteriors.practical_kind(table, best)
     device = one_device >= thresholds.STATED  # then what remains has a name, too
     in_doubt = _imitated(table, best, fit, names)
     sure = tuple(name for name in names if name not in in_doubt)
     kept = [n for n in best.causes if name_of(n) not in in_doubt]
-    mostly = device or posteriors.share_of_causes(table, best, kept) >= thresholds.MOST
+    mostly = device or posteriors.share_of_causes(table, best, kept) >= _most(table)
     verdict, structure, named, side_force = "undecided", None, (), None
     either: tuple[str, ...] = ()
     why = ""
@@ -92,6 +93,11 @@ def decide(
     ), found  # fmt: skip
 
 
+def _most(table: Hypotheses) -> float:
+    """Share of what a hypothesis explains, that its causes have to explain."""
+    return thresholds.MOST if table.parts.share_of_causes else 0.0
+
+
 def _imitated(
     table: Hypotheses, best: Hypothesis, fit: Fit, names: Sequence[str]
 ) -> dict[str, str]:
@@ -103,9 +109,9 @@ def _imitated(
         name = name_of(label)
         if label in table.trial.fixed or name not in names:
             continue
-        if not posteriors.slight(table, best, name):
+        if table.parts.imitation and not posteriors.slight(table, best, name):
             size = _size_without(table, fit.remainder, name)
-            share = fits.share_imitated(table.trial, fit, label, size)
+            share = fits.imitated(table.trial, fit, label, size)
             shares[name] = max(share, shares.get(name, 0.0))
     return {
         name: f"what remains unknown could do {share:.0%} of it as well"
@@ -134,7 +140,8 @@ def _named(
             continue
         assert best.found.covariance is not None
         numbers = np.asarray(best.found.numbers[label])
-        form = form_error_of(by[label]) * numbers  # its equations are no better than that
+        share = form_error_of(by[label]) if table.parts.form_error else 0.0
+        form = share * numbers  # its equations are no better than that
         unit = by[label].unit_error * numbers  # one error of all numbers of the cause
         given.append(
             Named(
@@ -177,7 +184,7 @@ def _structure(table: Hypotheses, best: Hypothesis, fit: Fit) -> Structure:
     if family in (STOCHASTIC, INTERMITTENT):
         channels = EVERYWHERE if family == STOCHASTIC else EVERYWHERE[1:]
         return Structure(family, gained, channels)
-    return Structure(family, gained, fits.channels_changed(table.trial, fit, best.kind))
+    return Structure(family, gained, fits.acts_on(table.trial, fit, best.kind))
 
 
 def _with_side_force(fit: Fit, side_force: SideForce) -> Fit:
