@@ -44,7 +44,7 @@ def diagnose(
 
     with loading():
         from shiplog.commands.diagnose import diagnose_command
-        from shiplog.diagnosis.parts import ALL
+        from shiplog.diagnosis.decision_parts import ALL
 
     found = diagnose_command(
         store, run, voyages=voyages or [], out=out, extend=extend, cause_files=cause or [],

@@ -12,8 +12,8 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from shiplog.commands.bars import reach, staged
+from shiplog.diagnosis.decision_parts import ALL, Parts
 from shiplog.diagnosis.linear import segments
-from shiplog.diagnosis.parts import ALL, Parts
 from shiplog.diagnosis.residual import error_location
 from shiplog.diagnosis.trial import trial_voyages
 from shiplog.diagnosis.verdict import (
@@ -40,7 +40,7 @@ from shiplog.training.runs.load_model import Run
 from shiplog.training.runs.provenance import Answer, provenance
 from shiplog.training.runs.run_checks import refuse_other_ship
 from shiplog.voyages.rows.recording import Record
-from shiplog.voyages.store import contradicted
+from shiplog.voyages.store import contradicted, parts
 from shiplog.voyages.store.contradicted import Contradicted
 from shiplog.voyages.store.store import Store
 from shiplog.voyages.windows.windows import Windows
@@ -272,8 +272,9 @@ def diagnose_command(
 ) -> Answer:
     """`shiplog diagnose`; an experiment hands in which parts of the decision act."""
     done = diagnose_run(
-        run, Store(store_path), voyages, out, extend=extend, cause_files=cause_files, switches=switches
-    )
+        run, Store(store_path), voyages, out, extend=extend, cause_files=cause_files,
+        switches=switches,
+    )  # fmt: skip
     text = f"{page.markdown(done.verdict)}\nReport: {out / 'report.md'}"
     content = done.verdict.as_json()
     if done.recording is not None:

@@ -236,7 +236,7 @@ def test_without_a_cause_the_search_goes_on_to_what_stood_behind_it(monkeypatch)
     assert found.table.ranked()[0].causes == ("drag",)
     weighed = {h.causes for h in found.table.ranked()}
     assert ("load",) not in weighed
-    found.without("drag")
+    found.exclude("drag")
     assert found.table.ranked()[0].causes == ("load",)
     assert found.table.found.best(NOMINAL, found.table.banned).causes == ("load",)
     assert all("drag" not in h.causes for h in posteriors.posterior(found).hypotheses)

@@ -19,12 +19,12 @@ from pipelines.experiments.hidden_effects import (
     suites,
     without,
 )
+from shiplog.diagnosis.decision_parts import ALL, Parts
 from shiplog.diagnosis.hypotheses.hypothesis import Priors
 from shiplog.diagnosis.hypotheses.table import Scale
 from shiplog.diagnosis.noise import discrepancy
 from shiplog.diagnosis.noise.remainder import NOMINAL
 from shiplog.diagnosis.nominal import campaign_characteristics, nominal_cache, nominal_fit
-from shiplog.diagnosis.parts import ALL, Parts
 from shiplog.diagnosis.trial import setup
 from shiplog.diagnosis.verdict import trial_decision
 from shiplog.models.causes import CATALOGUE
@@ -119,7 +119,7 @@ def test_without_form_errors_no_cause_has_one(acts):
     by, alone = {cause.label: cause for cause in coarse}, {"bank": 5000.0}
     scale = Scale(Priors(coarse, ()), {}, by, alone, 0.0, form_errors=acts)
     labels = ("bank", "shallow_water")
-    score = scale.score(0.0, labels, NOMINAL) - scale.priors.of(labels, NOMINAL)
+    score = scale.score(0.0, labels, NOMINAL) - scale.priors.hypothesis(labels, NOMINAL)
     assert score == pytest.approx(-200.0 if acts else 0.0)
 
 

@@ -18,9 +18,9 @@ from pipelines.experiments.hidden_effects import plan as plans
 from pipelines.experiments.hidden_effects import run
 from shiplog.cli import process
 from shiplog.diagnosis import thresholds
+from shiplog.diagnosis.decision_parts import ALL, Parts
 from shiplog.diagnosis.hypotheses.search import Search
 from shiplog.diagnosis.noise.remainder import NOMINAL
-from shiplog.diagnosis.parts import ALL, Parts
 from shiplog.diagnosis.trial import setup
 from shiplog.diagnosis.verdict import decide, posterior, trial_decision
 

@@ -29,10 +29,10 @@ from pipelines.experiments.hidden_effects.plan import positive
 from pipelines.experiments.hidden_effects.program import ROOT, identity, name
 from pipelines.experiments.hidden_effects.run import Settings
 from shiplog import cli
+from shiplog.diagnosis.decision_parts import ALL, Parts
 from shiplog.diagnosis.hypotheses import evidence
 from shiplog.diagnosis.noise import discrepancy
 from shiplog.diagnosis.nominal import campaign_characteristics, nominal_cache, nominal_fit
-from shiplog.diagnosis.parts import ALL, Parts
 from shiplog.machine import files
 
 BEFORE_SEARCH: Mapping[str, Parts] = {

@@ -1,5 +1,8 @@
 """The search: which hypotheses are weighed, starting from the best ones so far.
 
+The loop takes the best hypothesis, asks for its candidates (`additions`, `reductions`), weighs each
+(`weighing.weigh`), and puts what comes back into the table.
+
 Each set of causes is linearised again at its most probable numbers, and weighed under every kind of
 remainder. One cause is then added to the best hypotheses or dropped from them, until no promising
 set is left. A remainder may explain a part of what a cause explains wholly. As long as a cause
@@ -16,13 +19,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from shiplog.diagnosis import thresholds
+from shiplog.diagnosis.decision_parts import ALL, Parts
 from shiplog.diagnosis.hypotheses import evidence
 from shiplog.diagnosis.hypotheses.hypothesis import Hypothesis, holds_one, name_of
 from shiplog.diagnosis.hypotheses.intermittent import ResidualNoise
 from shiplog.diagnosis.hypotheses.table import Hypotheses, rescored, shortened
 from shiplog.diagnosis.hypotheses.weighing import SEARCH_NATS, CauseSet, weigh, weigh_as
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED
-from shiplog.diagnosis.parts import ALL, Parts
 from shiplog.diagnosis.trial.fitted import ExpectedEvidence, Fit, Point
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.models.causes import Cause
@@ -81,7 +84,7 @@ class Search:
             self._expand(fresh[0])
         self.table.found = rescored(self.table.found, self.table.scale)
 
-    def without(self, *names: str) -> None:
+    def exclude(self, *names: str) -> None:
         """Go on without a cause, or without these together, for as many sets again: those behind
         were hardly weighed."""
         self.table.banned.add(frozenset(names))

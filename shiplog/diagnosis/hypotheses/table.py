@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from shiplog.diagnosis.decision_parts import ALL, Parts
 from shiplog.diagnosis.hypotheses.hypothesis import (
     Hypothesis,
     Key,
@@ -17,7 +18,6 @@ from shiplog.diagnosis.hypotheses.hypothesis import (
 )
 from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED
-from shiplog.diagnosis.parts import ALL, Parts
 from shiplog.diagnosis.trial.fitted import Fit, Point
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.models.causes import Cause
@@ -70,7 +70,7 @@ class Scale:
         allowance = 0.0
         if self.form_errors:
             allowance = form_error(self.alone, labels, self.by, force)
-        return evidence + self.priors.of(labels, kind) - misfit - allowance
+        return evidence + self.priors.hypothesis(labels, kind) - misfit - allowance
 
     def hypothesis(
         self, labels: tuple[str, ...], evidence: float, fit: Fit, force: SideForce | None = None

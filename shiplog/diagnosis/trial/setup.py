@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shiplog.diagnosis.decision_parts import ALL, Parts
 from shiplog.diagnosis.nominal import nominal_cache, nominal_campaign, voyage_effects
-from shiplog.diagnosis.parts import ALL, Parts
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.diagnosis.trial.trial_voyages import model_of, setting_of
 from shiplog.models import causes as catalogue

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from weakref import ref
 
 import numpy as np
 
@@ -23,6 +24,9 @@ from shiplog.diagnosis.nominal import campaign_prior
 from shiplog.diagnosis.nominal.nominal_campaign import Campaign
 from shiplog.diagnosis.trial.cache import Cache
 from shiplog.diagnosis.trial.fitted import Point
+
+KEPT_MODES = 4  # 20 MB each
+KEPT_TOTALS = 41  # one point needs about a dozen levels, and again for each family
 
 
 @dataclass(frozen=True)
@@ -50,11 +54,13 @@ class Products:
         shape, left = remainder.shape, noise_factor
         if process_noise.intermittent is not None:
             process_noise, shape, left = process_noise.times(noise_factor), (shape, left), 1.0
-        kept = self.cache.modes(point.weighed, shape)
-        if kept is None:
-            kept = self._with_families(likelihood.modes(point.weighed, process_noise), point)
-            self.cache.keep_modes(point.weighed, shape, kept)
-        return kept, left
+        for of, known, modes in self.cache.modes:
+            if of is point.weighed and known == shape:
+                return modes, left
+        modes = self._with_families(likelihood.modes(point.weighed, process_noise), point)
+        first, last = self.cache.modes[:1], self.cache.modes[1:][2 - KEPT_MODES :]
+        self.cache.modes = [*first, *last, (point.weighed, shape, modes)]
+        return modes, left
 
     def _with_families(self, modes: Modes, point: Point) -> Modes:
         """With the columns of the discrepancy: a weight w acts as an acceleration W w."""
@@ -81,13 +87,14 @@ class Products:
         """G [1 + C, 1 + C] of all parts (4), C as in `each_part`, and Σ log|I + D^½ M D^½| (5)."""
         key = (noise, weight.tobytes(), remainder.shape)
         size = 1 + len(self._deviation(remainder))
-        kept = self.cache.total(point.weighed, key, size)
-        if kept is None:
-            voyages, volume = self._voyages(point, noise, weight, remainder)
-            kept = _sum(voyages.values()), volume
-            self.cache.keep_total(point.weighed, key, *kept)
-        G, volume = kept
-        return G if len(G) == size else G[:size, :size], volume
+        for of, known, G, volume in self.cache.totals:
+            if of() is point.weighed and known == key and len(G) >= size:
+                return G if len(G) == size else G[:size, :size], volume
+        voyages, volume = self._voyages(point, noise, weight, remainder)
+        G = _sum(voyages.values())
+        kept = (ref(point.weighed), key, G, volume)
+        self.cache.totals = [*self.cache.totals[1 - KEPT_TOTALS :], kept]
+        return G, volume
 
     def leaving_out(
         self, point: Point, noise: float, weight: np.ndarray, remainder: Remainder,
@@ -106,11 +113,11 @@ class Products:
         if not whole or len(gone) == len(set(self.voyage)):
             return self.total(point, noise, np.where(left_out, 0.0, weight), remainder)[0]
         key = (noise, weight.tobytes(), remainder)
-        voyages = self.cache.voyages(point.weighed, key)
-        if voyages is None:
+        kept = self.cache.voyages
+        if kept is None or kept[0]() is not point.weighed or kept[1] != key:
             voyages, _ = self._voyages(point, noise, weight, remainder)
-            self.cache.keep_voyages(point.weighed, key, voyages)
-        return _sum([G for of, G in voyages.items() if of not in gone])
+            self.cache.voyages = kept = (ref(point.weighed), key, voyages)
+        return _sum([G for of, G in kept[2].items() if of not in gone])
 
     def _voyages(
         self, point: Point, noise: float, weight: np.ndarray, remainder: Remainder
@@ -135,13 +142,11 @@ class Products:
         """log|R| (5) at one λ: that of the first point, for every hypothesis. Otherwise a model
         with less damping would gain evidence because it amplifies the noise."""
         key = (noise_factor, remainder.shape, weight.tobytes())
-
-        def volume() -> float:
+        if key not in self.cache.volumes:
             modes, by = self.modes(first, noise_factor, remainder)
             total = self.total(first, noise_factor, weight, remainder)
-            return modes.log_volume(by, weight) + total[1]
-
-        return self.cache.volume(key, volume)
+            self.cache.volumes[key] = modes.log_volume(by, weight) + total[1]
+        return self.cache.volumes[key]
 
 
 def _sum(each: Iterable[np.ndarray]) -> np.ndarray:

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shiplog.diagnosis.decision_parts import ALL, Parts
 from shiplog.diagnosis.hypotheses import evidence
 from shiplog.diagnosis.hypotheses.search import Search
 from shiplog.diagnosis.nominal import placebo
-from shiplog.diagnosis.parts import ALL, Parts
 from shiplog.diagnosis.trial import setup, trial_voyages
 from shiplog.diagnosis.trial.fitted import Point
 from shiplog.diagnosis.trial.trial import Trial

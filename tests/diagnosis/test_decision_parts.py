@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import weighed
 
+from shiplog.diagnosis.decision_parts import Parts
 from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED
-from shiplog.diagnosis.parts import Parts
 from shiplog.diagnosis.verdict import posterior as posteriors
 from shiplog.diagnosis.verdict.decide import decide
 
