@@ -1,13 +1,17 @@
 """Trials in which something is hidden, and searches of them."""
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 import straight
 from straight import CAUSES
 
 from shiplog.diagnosis.hypotheses import evidence
+from shiplog.diagnosis.hypotheses.intermittent import ResidualNoise
 from shiplog.diagnosis.hypotheses.search import Search
+from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
+from shiplog.diagnosis.trial.fitted import Fit
 
 SENSITIVITY = 0.6
 NOMINAL_SEED, TRIAL_SEED = 1, 2
@@ -44,11 +48,24 @@ def trial_with(hidden, causes=CAUSES, fixed=None, alike=None, **changes):
     return evidence.begin(trial, {n: np.asarray(v) for n, v in (fixed or {}).items()})
 
 
-def search_of(trial, point, placebo=None, likely=None) -> Search:
-    made = Search(trial, point, placebo or {}, likely)
-    made.table.intermittent = straight.no_hull
-    made.table.nominal_side_force = None
-    return made
+@dataclass(frozen=True)
+class Noise(ResidualNoise):
+    """Estimates of raised noise, and a force as given: its estimate at a fit, and its pattern."""
+
+    at_one_place: bool = False
+    estimate: Callable[[Fit], SideForce] = straight.no_hull
+    pattern: Callable[[SideForce], SideForce] = lambda force: force
+
+    def side_force(self, fit):
+        return self.estimate(fit)
+
+    def add_pattern(self, fit, force):
+        return self.pattern(force)
+
+
+def search_of(trial, point, placebo=None, likely=None, **force) -> Search:
+    """A search whose noise is as `Noise` has it."""
+    return Search(trial, point, placebo or {}, likely, Noise(trial, **force))
 
 
 def searched(hidden, placebo=None, likely=None, **setting) -> Search:

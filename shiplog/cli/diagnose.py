@@ -13,6 +13,7 @@ from shiplog.cli.output import LOST, answer
 
 
 def diagnose(
+    context: typer.Context,
     run: Annotated[Path, typer.Argument(help="A trained run, such as runs/mmg.")],
     voyages: TrialVoyages = None,
     store: StoreOption = STORE,
@@ -43,11 +44,13 @@ def diagnose(
 
     with loading():
         from shiplog.commands.diagnose import diagnose_run
+        from shiplog.diagnosis.decision_parts import ALL
     from shiplog.voyages.store.store import Store
 
     found = diagnose_run(
-        run, Store(store), voyages or [], out, extend=extend, cause_files=cause or []
-    )
+        run, Store(store), voyages or [], out, extend=extend, cause_files=cause or [],
+        switches=context.obj or ALL,
+    )  # fmt: skip
     answer(found, json_to)
     if not found.drawn:
         raise typer.Exit(LOST)

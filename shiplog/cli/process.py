@@ -36,7 +36,7 @@ class _Lines(logging.Handler):
         print(self.format(record), file=sys.stderr, flush=True)
 
 
-def main() -> None:
+def main(parts: object = None) -> None:
     """Entry point: settings of this process, then `run`."""
     _open_missing()
     disk_cache.keep_compiled()
@@ -47,7 +47,7 @@ def main() -> None:
         if signal.getsignal(number) is signal.SIG_DFL:  # not under nohup
             signal.signal(number, _stopped)
     ended = guard.guarded(sys.argv[1:])  # in the child there is none: it runs the command
-    sys.exit(run() if ended is None else ended)
+    sys.exit(run(parts=parts) if ended is None else ended)
 
 
 def _open_missing() -> None:
@@ -60,8 +60,9 @@ def _open_missing() -> None:
             setattr(sys, name, nowhere)
 
 
-def run(arguments: Sequence[str] | None = None) -> int:
-    """The exit code of a command line, that of this process unless one is given.
+def run(arguments: Sequence[str] | None = None, parts: object = None) -> int:
+    """The exit code of a command line, that of this process unless one is given. `parts` of the
+    decision are those that act in a diagnosis: an experiment hands them in.
 
     Whatever goes wrong is a sentence on stderr and never a traceback: a fault of the input says
     what to mend, and a fault of the program where its trace was written.
@@ -70,7 +71,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     try:
-        app(arguments)
+        app(arguments, obj=parts)
     except SystemExit as ended:  # as every command ends
         code = ended.code if isinstance(ended.code, int) else int(ended.code is not None)
         if code == STOPPED:  # of Ctrl-C, as typer returns it; SIGTERM has its own message

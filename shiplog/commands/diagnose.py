@@ -12,6 +12,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from shiplog.commands.bars import reach, staged
+from shiplog.diagnosis.decision_parts import ALL, Parts
 from shiplog.diagnosis.linear import segments
 from shiplog.diagnosis.residual import error_location
 from shiplog.diagnosis.trial import trial_voyages
@@ -68,8 +69,9 @@ def diagnose_run(
     *,
     extend: Path | None = None,
     cause_files: Sequence[Path] = (),
+    switches: Parts = ALL,
 ) -> Diagnosis:
-    """The whole way. Raises ShiplogError."""
+    """The whole way; the `switches` say which parts of the decision act. Raises ShiplogError."""
     began = time.time()
     check_diagnosis(out, extend)
     causes = user.load(cause_files)
@@ -80,7 +82,8 @@ def diagnose_run(
     recorded = trial_voyages.record_of(store, names, profile)
     before_effect = not parts.overlapping(names, run.trained_on) and not run.given
     nominal = _nominal(run, store, profile) if before_effect else None
-    nominal, recorded = trial_voyages.in_ship_time(run, nominal, recorded)
+    if switches.time_scale:
+        nominal, recorded = trial_voyages.in_ship_time(run, nominal, recorded)
     used = [*names, *store.there(run.trained_on)]
     against = contradicted.of(store, dict.fromkeys(used))
     if contradicted.everywhere(against):
@@ -88,7 +91,9 @@ def diagnose_run(
     elif answer.enough(recorded):
         if nominal is not None and len(segments.begins(nominal)) < NOMINAL:
             nominal = None
-        campaign = Campaigns(run, store, names, profile, recorded, nominal, before_effect, against)
+        campaign = Campaigns(
+            run, store, names, profile, recorded, nominal, before_effect, against, switches
+        )
         done = _decided(campaign, out, causes)
     else:
         done = Diagnosis(answer.too_little(run, recorded, before_effect), out)
@@ -119,6 +124,7 @@ class Campaigns:
     nominal: Record | None
     before_effect: bool
     against: Sequence[Contradicted] = ()
+    switches: Parts = ALL
 
 
 def _decided(of: Campaigns, out: Path, causes: Sequence[Cause]) -> Diagnosis:
@@ -147,10 +153,12 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> Diagnosis:
             return Diagnosis(
                 answer.other_convention(run, recorded, before_effect, why, of.against, notes), out
             )
-    lacking = baseline_check.lacking(run, store, profile) if nominal is not None else run.lacks
+    lacking = run.lacks
+    if nominal is not None:
+        lacking = baseline_check.lacking(run, store, profile) if of.switches.baseline else ""
     barred = contradicted_causes.barred_causes(contradicted.channels(of.against), profile)
     decided = trial_decision.decide_trial(
-        run, nominal, recorded, cut, causes, lacking, reach, barred, before, profile
+        run, nominal, recorded, cut, causes, lacking, reach, barred, before, profile, of.switches
     )
     tried, judge = decided.trial, decided.judge
     decision, found, dropped = decided.decision, decided.gain, dict(decided.refuted)

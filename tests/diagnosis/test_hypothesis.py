@@ -22,11 +22,13 @@ KINDS = (NOMINAL, RAISED, INTERMITTENT, *FAMILIES)
 def test_priors_of_one_cause_at_most_sum_to_one(catalogue):
     priors = Priors(catalogue, FAMILIES)
     sets = [(), *((cause.label,) for cause in catalogue)]
-    whole = sum(math.exp(priors.of(labels, kind)) for labels in sets for kind in KINDS)
+    whole = sum(math.exp(priors.hypothesis(labels, kind)) for labels in sets for kind in KINDS)
     assert whole == pytest.approx(1.0, rel=1e-12)
-    none = sum(math.exp(priors.of((), kind)) for kind in KINDS)
+    none = sum(math.exp(priors.hypothesis((), kind)) for kind in KINDS)
     assert none == pytest.approx(thresholds.NO_CHANGE, rel=1e-12)
-    remains = sum(math.exp(priors.of(labels, k)) for labels in sets for k in KINDS if k != NOMINAL)
+    remains = sum(
+        math.exp(priors.hypothesis(labels, k)) for labels in sets for k in KINDS if k != NOMINAL
+    )
     assert remains == pytest.approx(thresholds.REMAINDER, rel=1e-12)
 
 
@@ -96,5 +98,5 @@ def test_a_cause_next_to_an_intermittent_force_has_to_gain_more_than_the_force_l
     evidence = {((), NOMINAL): -20.0, ((), alone): 980.0}
     table.found = {key: SimpleNamespace(evidence=value) for key, value in evidence.items()}
     for kind, left in ((INTERMITTENT, 0.4), (RAISED, 0.0), (NOMINAL, 0.0)):
-        prior = table.priors.of(("drag",), kind)
-        assert table.score(990.0, ("drag",), kind) == pytest.approx(990.0 + prior - left)
+        prior = table.priors.hypothesis(("drag",), kind)
+        assert table.scale.score(990.0, ("drag",), kind) == pytest.approx(990.0 + prior - left)

@@ -9,7 +9,7 @@ import straight
 from straight import CAUSES, PROCESS_NOISE, SETTING
 
 from shiplog.diagnosis.hypotheses import evidence, intermittent, unrecorded_thruster
-from shiplog.diagnosis.hypotheses.intermittent import of_one_device
+from shiplog.diagnosis.hypotheses.intermittent import device_probability
 from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
 from shiplog.diagnosis.linear import segment_nodes, segments
 from shiplog.diagnosis.noise import likelihood, on_off, raised_noise
@@ -219,7 +219,7 @@ def test_a_device_is_on_where_it_pushes(hull):
     assert np.abs(force[~on]).max() < 1e-6 * np.abs(force[on]).min()
     assert np.abs(force[on]).mean() == pytest.approx(150.0, rel=0.1)
     assert np.isfinite(deviation).all()
-    assert intermittent.with_pattern(trial, fit, found) is found
+    assert intermittent.add_pattern(trial, fit, found) is found
     # it is more probable, with the course's own probability, than one that may act at any time
     always = replace(found.remainder, course=None)
     assert fit.found.evidence > left_with(trial, always).found.evidence + 50.0
@@ -349,8 +349,8 @@ def test_a_force_that_is_on_or_off_is_one_device():
     rng = np.random.default_rng(0)
     on = np.repeat(rng.uniform(size=(30, 4)) < 0.25, 4, axis=1)
     force = 5.0 * on + 0.3 * rng.standard_normal(on.shape)
-    assert of_one_device(force, np.full(on.shape, 0.3)) == 1.0
-    assert of_one_device(-force, np.full(on.shape, 0.3)) == 1.0
+    assert device_probability(force, np.full(on.shape, 0.3)) == 1.0
+    assert device_probability(-force, np.full(on.shape, 0.3)) == 1.0
 
 
 @pytest.mark.parametrize(
@@ -359,7 +359,7 @@ def test_a_force_that_is_on_or_off_is_one_device():
 def test_an_unclear_pattern_is_as_probably_one_device_as_not(between, probability):
     """Ten nodes at 5 N, some at 2 N, the others at none."""
     force = np.repeat([5.0, 2.0, 0.0], [10, between, 40 - between])[None]
-    assert of_one_device(force, np.full(force.shape, 0.3)) == probability
+    assert device_probability(force, np.full(force.shape, 0.3)) == probability
 
 
 def test_a_force_that_merely_varies_is_none():
@@ -369,9 +369,9 @@ def test_a_force_that_merely_varies_is_none():
     varies = 5.0 * rng.standard_normal((600, 16))
     slow = np.repeat(5.0 * rng.standard_normal((4000, 1)), 16, axis=1)
     for force in (varies, slow):
-        assert of_one_device(force, np.full(force.shape, 0.3)) == 0.0
+        assert device_probability(force, np.full(force.shape, 0.3)) == 0.0
     unmeasured = np.full(varies.shape, 2.0)
-    assert of_one_device(0.2 * varies, unmeasured) == 0.0
+    assert device_probability(0.2 * varies, unmeasured) == 0.0
 
 
 def test_noise_at_one_place_lasts_longer_with_the_others_and_counts_once():

@@ -97,8 +97,8 @@ def test_a_function_of_the_networks_inputs_is_in_every_hypothesis(afloat):
     assert ref.misfit.count == ref.columns.misfit == len(ref.columns.unit) - count > 0
     base, _ = evidence.scan(trial, afloat.point, ())
     fit = Fit(afloat.point, base, Remainder())
-    d = fits.solved(trial, fit)
-    left, own_numbers = trial.left(afloat.point.linear, d)
+    d = fits.numbers_from_point(trial, fit)
+    left, own_numbers = trial.less_misfit(afloat.point.linear, d)
     weights = d[count:]
     accelerations = ref.misfit.accelerations(afloat.point.linear.cut, trial.grid) @ weights
     wanted = afloat.point.linear.e - np.einsum(
@@ -119,7 +119,7 @@ def test_what_is_named_stands_in_the_network_with_the_judges_numbers(afloat):
     assert extended.fit.found.numbers["current"] == pytest.approx(one.numbers, rel=1e-4)
     assert extended.nothing.point.numbers == {} and extended.nothing.included == ()
     ref, base = trial.reference, trial.reference.model.base
-    d = fits.solution(trial, extended.fit).solution
+    d = fits.solution(trial, extended.fit).mean
     weights = d[ref.columns.linearised : len(ref.columns.unit)]
     assert fits.coefficients(trial, extended.fit) == pytest.approx(ref.misfit.bends(weights))
     assert np.abs(weights).max() > 0.0 and base.bent is None
@@ -143,7 +143,7 @@ def test_each_voyage_is_left_out_of_the_bends_and_of_the_numbers(afloat):
     assert np.abs(bends - bent).max() > 1e-3 * np.abs(whole).max()
     assert not np.allclose(numbers["current"], others["current"], rtol=1e-6)
     out = decision.fit.point.linear.cut.voyage == 0
-    alone, _ = fits.without(afloat.trial, decision.fit, out)
+    alone, _ = fits.refitted(afloat.trial, decision.fit, out)
     assert numbers["current"] == pytest.approx(alone["current"])
 
 

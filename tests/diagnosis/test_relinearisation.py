@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shiplog.diagnosis.hypotheses import evidence, relinearisation
-from shiplog.diagnosis.hypotheses.relinearisation import RELINEARISATIONS, converge
-from shiplog.diagnosis.trial.fitted import Found
+from shiplog.diagnosis.hypotheses import evaluate, evidence
+from shiplog.diagnosis.hypotheses.evaluate import RELINEARISATIONS
+from shiplog.diagnosis.noise.remainder import Remainder
+from shiplog.diagnosis.trial.fitted import Found, Start
 
 NOISE = 0.1
 
@@ -35,7 +36,12 @@ def fits(monkeypatch, function, slope) -> tuple[Any, list[float]]:
 
     monkeypatch.setattr(evidence, "fit", fit)
     monkeypatch.setattr(evidence, "scan", lambda *given, **_: (fit(*given), []))
-    return SimpleNamespace(at=at, converged={}, first=None, fixed=(), clipped=dict), asked
+    return SimpleNamespace(at=at, first=None, fixed=(), clipped=dict), asked
+
+
+def converge(trial, included, numbers, path, lowest=-np.inf):
+    fit = evaluate.evaluate(trial, included, Remainder(), Start(numbers, path), lowest)
+    return fit.point, fit.found
 
 
 def test_what_is_linear_takes_one_step(monkeypatch):
@@ -92,7 +98,7 @@ def test_steps_that_get_shorter_slowly_go_on_until_little_is_left(monkeypatch):
     """A slope that is a half too steep leaves a third of the way at each step: 30, 10, 3.3 ..."""
     trial, asked = fits(monkeypatch, lambda x: x, lambda x: 1.5)
     _, found = converge(trial, ("x",), {"x": np.array([3.0])}, None)
-    assert abs(found.numbers["x"][0]) < relinearisation.LEFT * NOISE
+    assert abs(found.numbers["x"][0]) < evaluate.LEFT * NOISE
     assert asked[:3] == pytest.approx([3.0, 1.0, 1.0 / 3.0])
 
 

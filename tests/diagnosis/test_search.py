@@ -43,13 +43,14 @@ def test_a_hidden_cause_is_found_and_sized(one):
 def test_a_cause_whose_fit_diverges_is_no_answer(monkeypatch):
     """Where it is linearised it explains much, and no fit of it holds: neither a name nor a
     probability is left of that, and the reason is reported."""
-    before = weighing.converge
+    before = weighing.resume
 
-    def diverges(trial, included, numbers, *more, **others):
-        point, found = before(trial, included, numbers, *more, **others)
-        return point, replace(found, evidence=-math.inf) if "drag" in included else found
+    def diverges(trial, included, *more, **others):
+        fit = before(trial, included, *more, **others)
+        gone = replace(fit, found=replace(fit.found, evidence=-math.inf))
+        return gone if "drag" in included else fit
 
-    monkeypatch.setattr(weighing, "converge", diverges)
+    monkeypatch.setattr(weighing, "resume", diverges)
     made = searched({"drag": [1.2]})
     assert made.diverged == {"drag"} and made.scanned["drag"] > 20.0
     decision, found = decide(made)
@@ -63,19 +64,19 @@ def test_a_cause_is_weighed_however_far_behind_nothing_is(monkeypatch):
     the cause would add nothing."""
     before, added = searching.weigh, Search._additions
 
-    def absorbs(table, labels, *given):
-        before(table, labels, *given)
-        if not labels:
-            nothing, remainder = table.nothing, Remainder("position")
-            score = nothing.score + 2.0 * searching.SEARCH_NATS
-            table.found[(), "position"] = replace(nothing, remainder=remainder, score=score)
+    def absorbs(of, *given):
+        weighed = before(of, *given)
+        if of.labels:
+            return weighed
+        score = weighed[0].score + 2.0 * searching.SEARCH_NATS
+        return [*weighed, replace(weighed[0], remainder=Remainder("position"), score=score)]
 
     def none_next_to_it(self, one, fit):
         return added(self, one, fit) if one.kind == NOMINAL else []
 
     monkeypatch.setattr(searching, "weigh", absorbs)
     monkeypatch.setattr(Search, "_additions", none_next_to_it)
-    monkeypatch.setattr(hypotheses.Hypotheses, "rescore", lambda table: None)
+    monkeypatch.setattr(searching, "rescored", lambda table, scale: table)
     best = searched({"drag": [1.2]}).table.ranked()[0]
     assert (best.causes, best.kind) == (("drag",), NOMINAL)
 
@@ -110,9 +111,9 @@ def test_a_likely_set_is_weighed_first_and_decides_nothing(monkeypatch, likely):
     """Right or wrong, the most probable hypothesis is the same one."""
     order, before = [], searching.weigh
 
-    def noted(table, labels, *given):
-        order.append(labels)
-        before(table, labels, *given)
+    def noted(of, *given):
+        order.append(of.labels)
+        return before(of, *given)
 
     hidden = {"drag": [1.2], "load": [1.2]}
     whole = searched(hidden).table.ranked()[0]
@@ -198,16 +199,15 @@ def test_a_set_with_one_cause_less_is_fitted_again_with_the_same_noise():
     wrong = replace(best.remainder, channels=(9.0, 1.0, 1.0), noise_lasts=4.0)
     lost = {"evidence": best.evidence - 50.0, "score": best.score - 50.0}
     before = replace(kept[("drag",), RAISED], remainder=wrong, **lost)
-    found.table.found[("drag",), RAISED] = before
     fit = found.table.fit(replace(best, causes=("drag",)))
     shaped = replace(best, remainder=replace(best.remainder, channels=(3.2, 3.2, 3.3)))
-    assert weighing.weigh_as(found.table, ("drag",), shaped, fit)
-    again = found.table.found[("drag",), RAISED]
-    assert again.remainder == shaped.remainder
+    of = found.cause_set(("drag",))
+    again = weighing.weigh_as(of, shaped, fit, before)
+    assert again is not None and again.remainder == shaped.remainder
     assert again.evidence == pytest.approx(best.evidence, abs=15.0)
-    assert not weighing.weigh_as(found.table, ("drag",), shaped, fit)  # it gains no more
+    assert weighing.weigh_as(of, shaped, fit, again) is None  # it gains no more
     plain = replace(best, remainder=Remainder(RAISED))
-    assert not weighing.weigh_as(found.table, ("drag",), plain, fit)
+    assert weighing.weigh_as(of, plain, fit, again) is None
 
 
 def test_a_force_of_the_place_is_unknown_and_depends_on_position():
@@ -236,9 +236,9 @@ def test_without_a_cause_the_search_goes_on_to_what_stood_behind_it(monkeypatch)
     assert found.table.ranked()[0].causes == ("drag",)
     weighed = {h.causes for h in found.table.ranked()}
     assert ("load",) not in weighed
-    found.without("drag")
+    found.exclude("drag")
     assert found.table.ranked()[0].causes == ("load",)
-    assert found.table.best_of(NOMINAL).causes == ("load",)
+    assert found.table.found.best(NOMINAL, found.table.banned).causes == ("load",)
     assert all("drag" not in h.causes for h in posteriors.posterior(found).hypotheses)
     assert set(found.scanned) == {c.label for c in CAUSES}
 

@@ -111,13 +111,13 @@ def test_segments_left_out_say_nothing(made):
         trial = straight.trial(nominal, record, one)
         point = trial.at({})
         fit = Fit(point, evidence.fit(trial, point, ("drag", "two"), 1.0, Remainder()), Remainder())
-        found.append(fits.without(trial, fit, out))
+        found.append(fits.refitted(trial, fit, out))
     (numbers, coefficients), (again, others) = found
     for label in ("drag", "two"):
         assert again[label] == pytest.approx(numbers[label], rel=1e-9)
     assert others == pytest.approx(coefficients, rel=1e-9)
     trial = straight.trial(nominal, record, spoilt)
-    whole = fits.without(trial, fit, np.zeros(8, dtype=bool))[0]
+    whole = fits.refitted(trial, fit, np.zeros(8, dtype=bool))[0]
     assert whole["drag"] != pytest.approx(numbers["drag"], rel=0.1)
 
 
@@ -138,7 +138,7 @@ def test_the_distance_of_a_segment_is_the_dense_one(made, monkeypatch):
     trial = straight.trial(nominal, record, given)
     point = trial.at({})
     best = max(evidence.levels(trial, point), key=lambda one: one.value)
-    left = best.solution[: len(trial.reference.pull)]
+    left = best.mean[: len(trial.reference.pull)]
     ref, chi2 = trial.reference, []
     observed = ref.misfit.accelerations(given.cut, trial.grid)
     for s, (e, j, z, c) in enumerate(straight.dense(given, PROCESS_NOISE.times(best.noise_factor))):
@@ -221,7 +221,7 @@ def test_what_is_left_out_is_left_out_of_a_trial_of_its_own(trial):
     less = trial.leaving_out(out)
     assert less.weight.tolist() == (~out).astype(float).tolist()
     assert trial.weight.tolist() == [1.0] * 8
-    assert less.first is trial.first and less.products is trial.products
+    assert less.first is trial.first and less.cache is trial.cache
 
 
 @pytest.mark.parametrize("kind", (NOMINAL, "position"))
@@ -230,7 +230,7 @@ def test_products_without_a_voyage_are_those_of_segments_of_no_weight(trial, kin
     """Of whole voyages, of a part of one, of parts of both, and of all that there is."""
     left_out = np.isin(np.arange(8), out)
     point, remainder, products = trial.at({}), Remainder(kind), trial.products
-    found = products.without(point, 1.5, trial.weight, remainder, left_out)
+    found = products.leaving_out(point, 1.5, trial.weight, remainder, left_out)
     weight = np.where(left_out, 0.0, trial.weight)
     fresh = straight.trial(trial.campaign, trial.record, trial.given).products
     wanted, _ = fresh.total(point, 1.5, weight, remainder)

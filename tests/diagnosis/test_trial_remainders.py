@@ -8,10 +8,10 @@ import pytest
 import straight
 from dense_trial import SHARE, gaussian, level, nats, of_noise
 from scipy.stats import multivariate_normal, norm
+from searchable import search_of
 from straight import CAUSES, PROCESS_NOISE
 
 from shiplog.diagnosis.hypotheses import evidence, fits, weighing
-from shiplog.diagnosis.hypotheses.table import Hypotheses
 from shiplog.diagnosis.noise import remainder
 from shiplog.diagnosis.noise.discrepancy import EVEN
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, RAISED, Remainder
@@ -25,7 +25,7 @@ from shiplog.diagnosis.trial.fitted import Fit
 def test_the_factor_of_a_change_is_the_difference_of_two_evidences(trial, family, included):
     point = trial.at({})
     base = level(trial, point, 1.4, included)
-    gained, size = fits.changed(trial, point, base, included, family, Remainder())
+    gained, size = evidence.family_change(trial, point, base, included, family, Remainder())
     each = [level(trial, point, 1.4, included, family, s).value for s in remainder.CHANGE_SIZES]
     assert gained == pytest.approx(max(each) - base.value, abs=1e-6)
     assert size == remainder.CHANGE_SIZES[int(np.argmax(each))]
@@ -49,7 +49,8 @@ def test_a_change_that_is_there_is_found_at_its_size(made):
     point = trial.at({})
     base = level(trial, point, 1.0)
     gained = {
-        name: fits.changed(trial, point, base, (), name, Remainder()) for name in trial.families
+        name: evidence.family_change(trial, point, base, (), name, Remainder())
+        for name in trial.families
     }
     best = max(gained, key=lambda name: gained[name][0])
     assert best == "position"
@@ -180,26 +181,27 @@ def test_a_fit_that_diverges_with_raised_noise_leaves_no_noise_to_explain(
     """The first or the second fit of a set diverges, with numbers that are not finite: neither a
     factor of each channel nor a force is asked of it, and the set stays with raised noise."""
     trial, point = evidence.begin(straight.trial(*made), {})
-    table, real, count = Hypotheses(trial, point, {}), weighing.converge, 0
+    real, count = weighing.resume, 0
     monkeypatch.setattr(weighing, "RAISED_FROM", 0.0)
 
-    def diverges(trial, included, numbers, *more, **others):
+    def diverges(trial, included, remainder, *more, **others):
         nonlocal count
-        count += len(others)  # its remainder, but for the fit that a set begins with
-        at, found = real(trial, included, numbers, *more, **others)
-        if count >= failing:
-            found = replace(found, evidence=-math.inf, numbers={"drag": np.array([np.nan])})
-        return at, found
+        count += remainder != weighing.RAISING  # not the fit that a set begins with
+        fit = real(trial, included, remainder, *more, **others)
+        if count < failing:
+            return fit
+        gone = {"drag": np.array([np.nan])}
+        return replace(fit, found=replace(fit.found, evidence=-math.inf, numbers=gone))
 
     def asked(fit):
         assert np.isfinite([*fit.found.numbers.values()]).all()
         return straight.no_hull(fit)
 
-    table.intermittent = asked
-    monkeypatch.setattr(table, "nominal_side_force", None, raising=False)
-    weighing.weigh(table, (), {}, point)
-    monkeypatch.setattr(weighing, "converge", diverges)
-    weighing.weigh(table, ("drag",), {"drag": np.zeros(1)}, point)
+    search = search_of(trial, point, estimate=asked)
+    search.weigh((), {}, point)
+    monkeypatch.setattr(weighing, "resume", diverges)
+    search.weigh(("drag",), {"drag": np.zeros(1)}, point)
+    table = search.table
     assert count >= failing
     assert np.isfinite(table.found[("drag",), RAISED].evidence)
     assert (("drag",), INTERMITTENT) not in table.found

@@ -6,17 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import straight
-from searchable import raised_noise, search_of, trial_with
+from searchable import Noise, raised_noise, search_of, trial_with
 
-from shiplog.diagnosis.hypotheses import evidence, fits, weighing
+from shiplog.diagnosis.hypotheses import evidence, weighing
 from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
-from shiplog.diagnosis.hypotheses.weighing import weigh
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
 
 
 def test_an_intermittent_force_is_tested_with_no_family(monkeypatch):
     """Where the process noise is raised, whatever was tried before it."""
-    asked, real = [], fits.changed
+    asked, real = [], evidence.family_change
 
     def no_force(fit):
         asked.append(fit.remainder)
@@ -27,13 +26,13 @@ def test_an_intermittent_force_is_tested_with_no_family(monkeypatch):
         asked.clear()
         trial, point = trial_with({}, accelerations=more)
         monkeypatch.setattr(
-            fits, "changed", lambda *given, gain=gain, last=last: (
+            evidence, "family_change", lambda *given, gain=gain, last=last: (
                 (gain, 3.0) if given[4] == last else real(*given)
             )
         )  # fmt: skip
-        table = search_of(trial, point).table
-        table.intermittent = no_force
-        weigh(table, (), {}, point)
+        search = search_of(trial, point, estimate=no_force)
+        search.weigh((), {}, point)
+        table = search.table
         assert table.found[(), RAISED].found.noise_factor > 1.5
         assert asked[0].kind == RAISED
         assert ((), INTERMITTENT) not in table.found  # it gains nothing: it is raised noise
@@ -57,16 +56,17 @@ def test_force_and_numbers_are_fitted_in_turn_until_the_evidence_stays(monkeypat
     the first one the noise alone is far more probable, which ends it unless that is allowed."""
     unit = np.array([0.0, 0.3, 0.2])
     trial, point = pushed_at_one_place(unit)
-    table, estimates = search_of(trial, point).table, iter([0.2, 0.8, 2.0, 2.0, 0.02])
+    estimates = iter([0.2, 0.8, 2.0, 2.0, 0.02])
     given = []
 
     def nearer(fit):
         given.append(next(estimates))
         return SideForce(0.0, 40.0, 0.0, given[-1], unit)
 
-    table.intermittent, table.with_pattern = nearer, lambda fit, force: force
     monkeypatch.setattr(weighing, "LEFT_NATS", left)
-    weigh(table, (), {}, point)
+    search = search_of(trial, point, estimate=nearer)
+    search.weigh((), {}, point)
+    table = search.table
     assert len(given) == asked
     if asked > 1:
         assert table.found[(), INTERMITTENT].side_force.force == 2.0
@@ -80,12 +80,11 @@ def test_a_set_with_the_force_of_another_one_needs_a_gain_of_its_own(gain, kept)
     there only where an estimate next to the drag gains over raised noise."""
     unit = np.array([0.0, 0.3, 0.2])
     trial, point = pushed_at_one_place(unit)
-    table = search_of(trial, point).table
-    table.with_pattern = lambda fit, force: force
-    table.intermittent = lambda fit: SideForce(0.0, 40.0, 0.0, 2.0, unit)
-    weigh(table, (), {}, point)
-    table.intermittent = lambda fit: SideForce(0.0, gain, 0.0, 0.02, unit)
-    weigh(table, ("drag",), {"drag": np.zeros(1)}, point)
+    search = search_of(trial, point, estimate=lambda fit: SideForce(0.0, 40.0, 0.0, 2.0, unit))
+    search.weigh((), {}, point)
+    search.noise = Noise(trial, estimate=lambda fit: SideForce(0.0, gain, 0.0, 0.02, unit))
+    search.weigh(("drag",), {"drag": np.zeros(1)}, point)
+    table = search.table
     assert ((("drag",), INTERMITTENT) in table.found) == kept
     if kept:
         force = table.found[("drag",), INTERMITTENT].side_force
@@ -97,10 +96,12 @@ def test_an_intermittent_force_is_a_hypothesis_where_it_gains_more_than_raised_n
     """Its evidence is that of the trial with the force in the process noise."""
     unit = np.array([0.0, 0.3, 0.2])
     trial, point = pushed_at_one_place(unit)
-    table = search_of(trial, point).table
-    table.intermittent = lambda fit: SideForce(0.0, gain, 0.0, 2.0, unit)
-    table.with_pattern = lambda fit, force: replace(force, device=0.5)
-    weigh(table, (), {}, point)
+    search = search_of(
+        trial, point, estimate=lambda fit: SideForce(0.0, gain, 0.0, 2.0, unit),
+        pattern=lambda force: replace(force, device=0.5),
+    )  # fmt: skip
+    search.weigh((), {}, point)
+    table = search.table
     if gain < 0.0:
         assert ((), INTERMITTENT) not in table.found
         return
@@ -121,11 +122,11 @@ def test_a_family_that_explains_a_tenth_of_raised_noise_gains_so_many_nats():
                        -count * math.log(noise) - 0.5 * count * (factor / noise) ** 2)
         for noise in (factor / 1.08, factor, factor * (1.0 + 1e-12), factor * 1.08, 1.0)
     ]  # fmt: skip
-    rough = weighing.Rough(None, weighing.RAISING, levels)
+    rough = weighing.Rough(None, None, weighing.RAISING, levels)
     assert rough.observations == pytest.approx(count, rel=0.02)
     share = 0.1 * (1.0 - 1.0 / factor**2)
     assert rough.spectrum() == pytest.approx(-0.5 * count * math.log(1.0 - share), rel=0.02)
-    nominal = weighing.Rough(None, weighing.RAISING, [replace(levels[0], noise_factor=1.0)])
+    nominal = weighing.Rough(None, None, weighing.RAISING, [replace(levels[0], noise_factor=1.0)])
     assert nominal.spectrum() == 0.0
 
 
@@ -136,7 +137,7 @@ def test_with_raised_noise_a_family_counts_where_it_alone_is_likelier_than_the_n
     """What gains a little together with noise that explains much is fitted to that noise."""
     trial, point = trial_with({}, accelerations=raised_noise())
     trial = replace(trial, campaign=replace(trial.campaign, noise=0.05))  # parts of the same noise
-    monkeypatch.setattr(fits, "changed", lambda *given: (gain, 3.0))
+    monkeypatch.setattr(evidence, "family_change", lambda *given: (gain, 3.0))
     levels = weighing.nominal_levels(trial, point, (), 1.0)
     raised = max(level.value for level in levels)
     quiet = weighing.best(trial, levels, NOMINAL).value
@@ -147,7 +148,8 @@ def test_with_raised_noise_a_family_counts_where_it_alone_is_likelier_than_the_n
     )  # fmt: skip
     assert quiet == pytest.approx(wanted)
     assert quiet + 2.0 < raised < quiet + 60.0
-    either = weighing.Rough(point, weighing.RAISING, levels)
-    change = weighing.changed(trial, either, either, (), "time")
+    of = search_of(trial, point).cause_set(())
+    either = weighing.Rough(of, point, weighing.RAISING, levels)
+    change = weighing.change(either, either, "time")
     assert change.remainder == Remainder("time", 3.0, noisy)
     assert change.value == (pytest.approx(raised + gain) if noisy else -math.inf)

@@ -16,11 +16,11 @@ from whole_way import PROFILE, apart, labels, truth
 from shiplog.commands import diagnose as pipeline
 from shiplog.commands.prepare import ingest_logs
 from shiplog.diagnosis.hypotheses import evidence
-from shiplog.diagnosis.hypotheses.relinearisation import converge
+from shiplog.diagnosis.hypotheses.evaluate import resume
 from shiplog.diagnosis.noise.remainder import Remainder
 from shiplog.diagnosis.residual import next_manoeuvre
 from shiplog.diagnosis.trial import setup
-from shiplog.diagnosis.trial.fitted import Fit
+from shiplog.diagnosis.trial.fitted import Fit, Start
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.diagnosis.verdict import exchanged_twins, sign_conventions
 from shiplog.diagnosis.verdict.held_out import HeldOut
@@ -196,7 +196,8 @@ def test_windows_feel_a_current_and_not_the_clock_of_the_position(sea):
     (current,) = decision.named
     both = tuple(sorted((current.cause.label, clock)))
     numbers = {current.cause.label: current.numbers, clock: np.array([0.3])}
-    point, found = converge(trial, both, numbers, decision.fit.point.path)
+    fit = resume(trial, both, Remainder(), Start(numbers, decision.fit.point.path))
+    point, found = fit.point, fit.found
     by = {c.label: c for c in sea.campaign.reference.model.causes}
     late = replace(current, cause=by[clock], numbers=found.numbers[clock])
     joint = replace(decision, fit=Fit(point, found, Remainder()), named=(current, late))
@@ -260,7 +261,8 @@ def test_causes_converge_from_where_they_converged_before(compass):
     asked.clear()
     ends = []
     for begin in (0.5, -0.5):
-        _, found = converge(again, (label,), {label: np.array([begin])}, point.path)
+        start = Start({label: np.array([begin])}, point.path)
+        found = resume(again, (label,), Remainder(), start).found
         ends.append((len(asked), *found.numbers[label]))
         asked.clear()
     assert ends[0][0] > 2 and ends[1][0] == 1

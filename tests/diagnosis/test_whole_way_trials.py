@@ -9,9 +9,10 @@ from whole_way import apart, hidden, judged, labels, truth, turned
 
 from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.hypotheses import evidence
-from shiplog.diagnosis.hypotheses.relinearisation import converge
+from shiplog.diagnosis.hypotheses.evaluate import evaluate
 from shiplog.diagnosis.linear import linearisation, measurement_correction, segments
-from shiplog.diagnosis.trial.fitted import Found
+from shiplog.diagnosis.noise.remainder import Remainder
+from shiplog.diagnosis.trial.fitted import Fit, Found, Start
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.diagnosis.verdict import result as decisions
 from shiplog.voyages.rows import timescale  # fmt: skip
@@ -179,8 +180,8 @@ def test_a_fit_that_runs_away_is_worth_nothing(still, monkeypatch):
 
     monkeypatch.setattr(evidence, "levels", broken)
     path = decision.nothing.point.path
-    _, found = converge(replace(trial, converged={}), ("current",), {"current": np.zeros(2)}, path)
-    assert found.evidence == -np.inf
+    start = Start({"current": np.zeros(2)}, path)
+    assert evaluate(trial, ("current",), Remainder(), start).found.evidence == -np.inf
 
 
 def test_the_others_may_explain_far_less_without_a_cause(still, monkeypatch):
@@ -202,8 +203,8 @@ def test_the_others_may_explain_far_less_without_a_cause(still, monkeypatch):
     monkeypatch.setattr(evidence, "scan", scanned)
     monkeypatch.setattr(evidence, "fit", lambda *given: scanned(*given)[0])
     begin = {"heading_offset": np.array([0.16])}
-    _, found = converge(replace(trial, converged={}), ("heading_offset",), begin, None)
-    assert found.evidence == converged
+    fit = evaluate(trial, ("heading_offset",), Remainder(), Start(begin, None))
+    assert fit.found.evidence == converged
 
 
 def test_where_the_others_run_away_without_a_cause_nothing_is_left(compass, monkeypatch):
@@ -216,7 +217,8 @@ def test_where_the_others_run_away_without_a_cause_nothing_is_left(compass, monk
     fit = replace(decision.fit, found=replace(decision.fit.found, numbers=both))
     two = replace(decision, named=(one, other), fit=fit)
     gone = Found("heading_offset", -np.inf, 1.0, {one.cause.label: one.numbers})
-    monkeypatch.setattr(decisions, "converge", lambda *_, **__: (decision.fit.point, gone))
+    less = Fit(decision.fit.point, gone, fit.remainder)
+    monkeypatch.setattr(decisions, "resume", lambda *_, **__: less)
     left = decisions.without_cause(trial, two, other)
     assert left.named == () and left.verdict == "none"
     assert left.fit is decision.nothing
@@ -236,16 +238,18 @@ def test_a_fit_that_runs_away_takes_a_shorter_step(still, monkeypatch):
         return point
 
     monkeypatch.setattr(Trial, "at", bounded)
-    trial = replace(trial, converged={})
-    _, found = converge(trial, ("heading_offset",), {"heading_offset": np.array([0.8])}, path)
+
+    def fitted(offset, lowest=-np.inf):
+        start = Start({"heading_offset": np.array([offset])}, path)
+        return evaluate(trial, ("heading_offset",), Remainder(), start, lowest).found
+
+    found = fitted(0.8)
     assert away == [0.8, 0.4] and abs(found.numbers["heading_offset"][0]) < 0.02
     assert -30.0 < found.evidence - decision.nothing.found.evidence < thresholds.SHOWS_NATS
     away.clear()
-    trial.converged.clear()
-    _, found = converge(trial, ("heading_offset",), {"heading_offset": np.array([8.0])}, path)
+    found = fitted(8.0)
     assert away == [8.0, 4.0, 2.0, 1.0] and found.evidence == -np.inf
     # nothing that converges is so high: each step went too far
     low = decision.nothing.found.evidence + 900.0
-    begin = {"heading_offset": np.array([0.01])}
-    _, found = converge(trial, ("heading_offset",), begin, path, low)
+    found = fitted(0.01, low)
     assert found.evidence == -np.inf

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from contextlib import ExitStack
+from dataclasses import asdict, fields
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -18,12 +19,14 @@ from pipelines.experiments.hidden_effects import (
     suites,
     without,
 )
-from shiplog.diagnosis import thresholds
-from shiplog.diagnosis.hypotheses.hypothesis import form_error, form_error_of
+from shiplog.diagnosis.decision_parts import ALL, Parts
+from shiplog.diagnosis.hypotheses.hypothesis import Priors
+from shiplog.diagnosis.hypotheses.table import Scale
 from shiplog.diagnosis.noise import discrepancy
-from shiplog.diagnosis.nominal import campaign_characteristics, nominal_cache, nominal_fit, placebo
-from shiplog.diagnosis.trial import setup, trial_voyages
-from shiplog.diagnosis.verdict import baseline_check, posterior, refutation, trial_decision
+from shiplog.diagnosis.noise.remainder import NOMINAL
+from shiplog.diagnosis.nominal import campaign_characteristics, nominal_cache, nominal_fit
+from shiplog.diagnosis.trial import setup
+from shiplog.diagnosis.verdict import trial_decision
 from shiplog.models.causes import CATALOGUE
 
 
@@ -73,28 +76,30 @@ def test_an_ablation_counts_the_answers_that_a_part_changes(tmp_path, stubs, mon
     assert {folder.name for folder in (tmp_path / "out-without").iterdir()} == set(asked)
 
 
-@pytest.mark.parametrize("part", list(without.PARTS))
-def test_every_part_that_can_be_taken_out_is_there_and_comes_back(part):
-    """What a part replaces exists under that name, and is itself again afterwards."""
+def test_every_part_is_taken_out_by_a_switch_of_its_own():
+    """Or else of the nominal fit: what is replaced there exists, and is itself again afterwards."""
+    switches = {field.name.replace("_", "-") for field in fields(Parts)}
+    assert set(without.PARTS) == {without.WHOLE, *switches, *without.ESTIMATES}
+    assert set(without.PARTS) == {*ablation.MEANING}
+    for part, given in without.PARTS.items():
+        off = {name.replace("_", "-") for name, acts in asdict(given).items() if not acts}
+        assert off == {
+            "share-of-causes": {part, "imitation"}, without.WHOLE: set(),
+            **{key: set() for key in without.ESTIMATES},
+        }.get(part, {part})  # fmt: skip
+
+
+@pytest.mark.parametrize("part", list(without.ESTIMATES))
+def test_what_is_replaced_in_the_nominal_fit_comes_back(part):
     watched = {
-        "placebo": (placebo, "placebos"), "form-error": (thresholds, "FORM_ERROR"),
-        "discrepancy": (discrepancy, "SEEN"), "voyage-effects": (nominal_cache, "characteristics"),
-        "share-of-trial": (nominal_cache, "characteristics"),
+        "discrepancy": (discrepancy, "SEEN"),
         "robust-weights": (campaign_characteristics, "robust_weights"),
-        "refutation": (refutation, "judged"), "baseline": (baseline_check, "lacking"),
-        "practical-size": (posterior, "practical"), "share-of-causes": (thresholds, "MOST"),
-        "time-scale": (trial_voyages, "in_ship_time"), "imitation": (without.fits, "imitated"),
-        "spectrum": (thresholds, "SPECTRUM"), "slight": (thresholds, "SLIGHT"),
-        "ordinary-noise": (thresholds, "ORDINARY_NOISE"),
-        "ordinary-spreads": (thresholds, "ORDINARY_SPREADS"), "pattern": (posterior, "device"),
     }  # fmt: skip
-    assert set(without.PARTS) == {without.WHOLE, *watched} == {*ablation.MEANING}
-    before = {name: getattr(*where) for name, where in watched.items()}
+    before = getattr(*watched[part])
     with ExitStack() as stack:
-        without.PARTS[part](stack)
-        if part in watched:
-            assert getattr(*watched[part]) is not before[part]
-    assert all(getattr(*where) is before[name] for name, where in watched.items())
+        without.ESTIMATES[part](stack)
+        assert getattr(*watched[part]) is not before
+    assert getattr(*watched[part]) is before
 
 
 def test_a_fit_without_the_discrepancy_is_not_that_of_the_cache(monkeypatch):
@@ -102,18 +107,20 @@ def test_a_fit_without_the_discrepancy_is_not_that_of_the_cache(monkeypatch):
     monkeypatch.setattr(nominal_fit, "converged", lambda *given, seen: (given, seen))
     monkeypatch.setattr(nominal_cache, "_key", None)  # whoever wants to read or keep it needs that
     with ExitStack() as stack:
-        without.PARTS["discrepancy"](stack)
+        without.ESTIMATES["discrepancy"](stack)
         assert nominal_cache.converged("model", "record") == (("model", "record"), ())
 
 
-def test_without_form_errors_no_cause_has_one():
+@pytest.mark.parametrize("acts", [True, False])
+def test_without_form_errors_no_cause_has_one(acts):
+    """An allowance of a fifth squared of 5000 nats, or none."""
     coarse = [cause for cause in CATALOGUE if cause.form_error]
-    assert {cause.name for cause in coarse} == {"bank", "shallow_water"}
-    with ExitStack() as stack:
-        without.PARTS["form-error"](stack)
-        assert {form_error_of(cause) for cause in CATALOGUE} == {0.0}
-        assert form_error({}, ("bank",), {"bank": coarse[0]}, 5000.0) == 0.0
-    assert {form_error_of(cause) for cause in coarse} == {0.2}
+    assert {cause.name: cause.form_error for cause in coarse} == {"bank": 0.2, "shallow_water": 0.2}
+    by, alone = {cause.label: cause for cause in coarse}, {"bank": 5000.0}
+    scale = Scale(Priors(coarse, ()), {}, by, alone, 0.0, form_errors=acts)
+    labels = ("bank", "shallow_water")
+    score = scale.score(0.0, labels, NOMINAL) - scale.priors.hypothesis(labels, NOMINAL)
+    assert score == pytest.approx(-200.0 if acts else 0.0)
 
 
 def test_of_one_search_a_verdict_is_made_again_only_without_a_part_that_matters(
@@ -126,13 +133,15 @@ def test_of_one_search_a_verdict_is_made_again_only_without_a_part_that_matters(
     monkeypatch.setattr(
         trial_decision, "_searched", lambda numbers: searched.append("searched") or found
     )
-    monkeypatch.setattr(one_search, "_decided", lambda kept: thresholds.SLIGHT)
+    monkeypatch.setattr(one_search, "_decided", lambda kept: kept.parts.slight)
 
-    def run_shiplog(arguments):
+    def run_shiplog(arguments, parts=ALL):
         setup.trial_of(None)
         trial_decision._searched(None)
         asked.append(dict(zip(arguments[1::2], arguments[2::2], strict=True)))
-        Path(asked[-1]["--json"]).write_text(f"slight {thresholds.SLIGHT}", encoding="utf-8")
+        Path(asked[-1]["--json"]).write_text(
+            f"slight {found.search.table.parts.slight}", encoding="utf-8"
+        )
         return 3
 
     monkeypatch.setattr(one_search.process, "run", run_shiplog)
@@ -146,8 +155,8 @@ def test_of_one_search_a_verdict_is_made_again_only_without_a_part_that_matters(
     assert [Path(one["--out"]).name for one in asked] == ["d", "d-slight"]
     left = {path.name: path.read_text(encoding="utf-8") for path in tmp_path.glob("*.json")}
     assert left == {
-        "verdict.json": "slight 0.02", "verdict-without-slight.json": "slight 0.0",
-        "verdict-without-imitation.json": "slight 0.02",
+        "verdict.json": "slight True", "verdict-without-slight.json": "slight False",
+        "verdict-without-imitation.json": "slight True",
     }  # fmt: skip
 
 

@@ -18,16 +18,16 @@ from pipelines.experiments.hidden_effects import plan as plans
 from pipelines.experiments.hidden_effects import run
 from shiplog.cli import process
 from shiplog.diagnosis import thresholds
+from shiplog.diagnosis.decision_parts import ALL, Parts
 from shiplog.diagnosis.hypotheses.search import Search
 from shiplog.diagnosis.noise.remainder import NOMINAL
 from shiplog.diagnosis.trial import setup
-from shiplog.diagnosis.verdict import decide, posterior, refutation, trial_decision
+from shiplog.diagnosis.verdict import decide, posterior, trial_decision
 
 WITHOUT = "verdict-without-{}.json"
-Part = Callable[[ExitStack], None]
 
 
-def diagnose(arguments: Sequence[str], parts: Mapping[str, Part]) -> None:
+def diagnose(arguments: Sequence[str], parts: Mapping[str, Parts]) -> None:
     """`shiplog diagnose RUN ... --out OUT --json FILE`, and next to FILE the verdict without each
     part. A verdict that these data do not allow, as `coverage`, is the same without any part."""
     given = list(arguments)
@@ -41,13 +41,12 @@ def diagnose(arguments: Sequence[str], parts: Mapping[str, Part]) -> None:
         as_it_is = _decided(kept)
         for name, part in parts.items():
             again = verdict.with_name(WITHOUT.format(name))
-            with ExitStack() as stack:
-                part(stack)
-                if _decided(kept) == as_it_is:
-                    shutil.copyfile(verdict, again)
-                    continue
-                given[out], given[file] = str(folder.with_name(f"d-{name}")), str(again)
-                process.run(given)
+            kept.parts = part
+            if _decided(kept) == as_it_is:
+                shutil.copyfile(verdict, again)
+                continue
+            given[out], given[file] = str(folder.with_name(f"d-{name}")), str(again)
+            process.run(given, part)
     sys.exit(rc)
 
 
@@ -73,6 +72,7 @@ class _Kept:
     def __init__(self) -> None:
         self.made: dict[tuple, setup.Setup] = {}
         self.found: dict[tuple, Any] = {}
+        self.parts = ALL
 
     @contextmanager
     def searches(self) -> Iterator[None]:
@@ -85,20 +85,22 @@ class _Kept:
             yield
 
     def _once(self, made: Callable, kept: dict[tuple, Any]) -> Callable:
-        def once(*given):
+        def once(*given, **named):
             numbers = given[-1] or {}
             key = tuple((label, *map(float, numbers[label])) for label in sorted(numbers))
             if key not in kept:
-                kept[key] = made(*given)
+                kept[key] = made(*given, **named)
             self.take_back()
             return kept[key]
 
         return once
 
     def take_back(self) -> None:
-        """Every search as before any name was refuted; further sets may have been weighed."""
+        """Every search as before any name was refuted, to be decided with `parts`; further sets may
+        have been weighed."""
         for found in self.found.values():
             found.search.table.banned.clear()
+            found.search.table.parts = self.parts
 
 
 def _decided(kept: _Kept) -> object:
@@ -117,5 +119,5 @@ def _decided(kept: _Kept) -> object:
     return (
         decision.verdict, tuple(one.cause.label for one in decision.named), decision.structure,
         decision.side_force is None, decision.one_of, decision.either, decision.why,
-        decision.rejected, slight, remains, names and refutation.judged,
+        decision.rejected, slight, remains, names and kept.parts.refutation,
     )  # fmt: skip

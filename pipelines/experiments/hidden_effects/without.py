@@ -16,9 +16,8 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
 from unittest.mock import patch
 
@@ -26,38 +25,40 @@ import numpy as np
 
 from pipelines.experiments.hidden_effects import ablation, one_search, replay
 from pipelines.experiments.hidden_effects.ablation import WHOLE
-from pipelines.experiments.hidden_effects.one_search import Part
 from pipelines.experiments.hidden_effects.plan import positive
 from pipelines.experiments.hidden_effects.program import ROOT, identity, name
 from pipelines.experiments.hidden_effects.run import Settings
 from shiplog import cli
-from shiplog.diagnosis import thresholds
-from shiplog.diagnosis.hypotheses import evidence, fits
-from shiplog.diagnosis.hypotheses.table import Hypotheses
+from shiplog.diagnosis.decision_parts import ALL, Parts
+from shiplog.diagnosis.hypotheses import evidence
 from shiplog.diagnosis.noise import discrepancy
-from shiplog.diagnosis.noise.remainder import INTERMITTENT
-from shiplog.diagnosis.nominal import (
-    campaign_characteristics,
-    nominal_cache,
-    nominal_fit,
-    placebo,
-    voyage_effects,
-)
-from shiplog.diagnosis.trial import trial_voyages
-from shiplog.diagnosis.verdict import baseline_check, posterior, refutation
+from shiplog.diagnosis.nominal import campaign_characteristics, nominal_cache, nominal_fit
 from shiplog.machine import files
-from shiplog.models.causes import CATALOGUE
 
-
-def _no_placebo(stack: ExitStack) -> None:
-    stack.enter_context(patch.object(placebo, "placebos", lambda campaign: {}))
-    stack.enter_context(patch.object(Hypotheses, "nominal_side_force", None))
-
-
-def _no_form_error(stack: ExitStack) -> None:
-    stack.enter_context(patch.object(thresholds, "FORM_ERROR", 0.0))
-    for coarse in {type(cause) for cause in CATALOGUE if cause.form_error}:
-        stack.enter_context(patch.object(coarse, "form_error", 0.0))
+BEFORE_SEARCH: Mapping[str, Parts] = {
+    "placebo": Parts(placebo=False),
+    "form-error": Parts(form_error=False),
+    "discrepancy": ALL,  # of the nominal fit: see `ESTIMATES`
+    "voyage-effects": Parts(voyage_effects=False),
+    "share-of-trial": Parts(share_of_trial=False),
+    "robust-weights": ALL,
+    "baseline": Parts(baseline=False),
+    "spectrum": Parts(spectrum=False),
+    "time-scale": Parts(time_scale=False),
+}
+AFTER_SEARCH: Mapping[str, Parts] = {
+    "refutation": Parts(refutation=False),
+    "practical-size": Parts(practical_size=False),
+    # with `imitation`, which asks for that share the other way round
+    "share-of-causes": Parts(share_of_causes=False, imitation=False),
+    "imitation": Parts(imitation=False),
+    "slight": Parts(slight=False),
+    "ordinary-noise": Parts(ordinary_noise=False),
+    "ordinary-spreads": Parts(ordinary_spreads=False),
+    "pattern": Parts(pattern=False),
+}
+GROUPS = {"before-search": BEFORE_SEARCH, "after-search": AFTER_SEARCH}
+PARTS: Mapping[str, Parts] = {WHOLE: ALL, **BEFORE_SEARCH, **AFTER_SEARCH}
 
 
 def _no_discrepancy(stack: ExitStack) -> None:
@@ -72,28 +73,6 @@ def _no_discrepancy(stack: ExitStack) -> None:
     _learned_anew(stack)
 
 
-def _voyages_alike(stack: ExitStack) -> None:
-    """No part of a campaign differs from another."""
-    learned = nominal_cache.characteristics
-
-    def alike(*given):
-        found = learned(*given)
-        least = dict.fromkeys(found.deviation, voyage_effects.LEAST_DEVIATION)
-        return replace(found, deviation=least)
-
-    stack.enter_context(patch.object(nominal_cache, "characteristics", alike))
-
-
-def _whole_share(stack: ExitStack) -> None:
-    """A trial counts all of itself."""
-    learned = nominal_cache.characteristics
-
-    def whole(*given):
-        return replace(learned(*given), share=1.0)
-
-    stack.enter_context(patch.object(nominal_cache, "characteristics", whole))
-
-
 def _no_robust_weights(stack: ExitStack) -> None:
     def plain(square, kept):
         return np.where(kept, 1.0, 0.0)
@@ -101,77 +80,6 @@ def _no_robust_weights(stack: ExitStack) -> None:
     for module in (campaign_characteristics, evidence):
         stack.enter_context(patch.object(module, "robust_weights", plain))
     _learned_anew(stack)
-
-
-def _no_refutation(stack: ExitStack) -> None:
-    judged = refutation.judged
-
-    def unjudged(search, held):
-        decision, found, _, refuted = judged(search, None)
-        gain = held.gain(decision) if held is not None and decision.named else None
-        return decision, found, gain, refuted
-
-    stack.enter_context(patch.object(refutation, "judged", unjudged))
-
-
-def _no_baseline(stack: ExitStack) -> None:
-    stack.enter_context(patch.object(baseline_check, "lacking", lambda *given: ""))
-
-
-def _no_practical_size(stack: ExitStack) -> None:
-    stack.enter_context(
-        patch.object(posterior, "practical", lambda table, one: dict.fromkeys(one.causes, 1.0))
-    )
-
-
-def _no_share_of_causes(stack: ExitStack) -> None:
-    """A cause is named however small a share of the error it explains."""
-    stack.enter_context(patch.object(thresholds, "MOST", 0.0))
-    _no_imitation(stack)  # which asks for that number the other way round
-
-
-def _no_imitation(stack: ExitStack) -> None:
-    """A cause is named though the remainder next to it could do most of what it does."""
-    stack.enter_context(patch.object(fits, "imitated", lambda *given: 0.0))
-
-
-def _none_slight(stack: ExitStack) -> None:
-    """However little a remainder explains, it may put a name in doubt."""
-    stack.enter_context(patch.object(thresholds, "SLIGHT", 0.0))
-
-
-def _no_error_of_spectrum(stack: ExitStack) -> None:
-    """A change of the discrepancy counts however little of raised noise it explains."""
-    stack.enter_context(patch.object(thresholds, "SPECTRUM", 0.0))
-
-
-def _no_ordinary_noise(stack: ExitStack) -> None:
-    """Noise that is raised by anything is a remainder."""
-    stack.enter_context(patch.object(thresholds, "ORDINARY_NOISE", 1.0))
-
-
-def _no_ordinary_spreads(stack: ExitStack) -> None:
-    """How far the noise differs from voyage to voyage does not count."""
-    stack.enter_context(patch.object(thresholds, "ORDINARY_SPREADS", 0.0))
-
-
-def _no_pattern(stack: ExitStack) -> None:
-    """An intermittent force is one device where a course that is on or off is more probable."""
-
-    def device(one):
-        force = one.side_force
-        return float(one.kind == INTERMITTENT and force is not None and force.course is not None)
-
-    stack.enter_context(patch.object(posterior, "device", device))
-
-
-def _fixed_time_scale(stack: ExitStack) -> None:
-    """Segments of 30 s whatever the ship."""
-
-    def as_they_are(run, nominal, recorded):
-        return nominal, recorded
-
-    stack.enter_context(patch.object(trial_voyages, "in_ship_time", as_they_are))
 
 
 def _learned_anew(stack: ExitStack) -> None:
@@ -183,29 +91,11 @@ def _learned_anew(stack: ExitStack) -> None:
     stack.enter_context(patch.object(nominal_cache, "characteristics", learned))
 
 
-BEFORE_SEARCH: Mapping[str, Part] = {
-    "placebo": _no_placebo,
-    "form-error": _no_form_error,
+# Parts of the nominal fit, which is before the decision: replaced where they stand
+ESTIMATES: Mapping[str, Callable[[ExitStack], None]] = {
     "discrepancy": _no_discrepancy,
-    "voyage-effects": _voyages_alike,
-    "share-of-trial": _whole_share,
     "robust-weights": _no_robust_weights,
-    "baseline": _no_baseline,
-    "spectrum": _no_error_of_spectrum,
-    "time-scale": _fixed_time_scale,
 }
-AFTER_SEARCH: Mapping[str, Part] = {
-    "refutation": _no_refutation,
-    "practical-size": _no_practical_size,
-    "share-of-causes": _no_share_of_causes,
-    "imitation": _no_imitation,
-    "slight": _none_slight,
-    "ordinary-noise": _no_ordinary_noise,
-    "ordinary-spreads": _no_ordinary_spreads,
-    "pattern": _no_pattern,
-}
-GROUPS = {"before-search": BEFORE_SEARCH, "after-search": AFTER_SEARCH}
-PARTS: Mapping[str, Part] = {WHOLE: lambda stack: None, **BEFORE_SEARCH, **AFTER_SEARCH}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -214,9 +104,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         one_search.diagnose(given[1:], AFTER_SEARCH)
     if given and given[0] in PARTS:
         with ExitStack() as stack:
-            PARTS[given[0]](stack)
+            if given[0] in ESTIMATES:
+                ESTIMATES[given[0]](stack)
             sys.argv = ["shiplog", *given[1:]]
-            cli.main()
+            cli.main(PARTS[given[0]])
         return 0
     parser = argparse.ArgumentParser(
         prog="python -m pipelines.experiments.hidden_effects.without",

@@ -1,21 +1,21 @@
-"""Log evidence of a hypothesis about a trial: algebra on the products of a point.
+"""Evidence and posterior of a hypothesis at one point: equations (6) to (13) of this room.
 
-The base hypothesis holds the nominal numbers, the causes that are included, free, and the change
-of weights of its remainder.
+The base hypothesis of a point holds the nominal numbers, the causes that are included, free, and
+the change of weights of its remainder's family. A candidate is one cause in addition to it.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from shiplog.diagnosis.linear.parameter_layout import HELD_INFORMATION
 from shiplog.diagnosis.noise import bounds
 from shiplog.diagnosis.noise.campaign_parts import robust_weights, squares
-from shiplog.diagnosis.noise.remainder import Remainder, noise_prior
+from shiplog.diagnosis.noise.remainder import CHANGE_SIZES, Remainder, noise_prior
 from shiplog.diagnosis.trial.fitted import ExpectedEvidence, Found, Level, Point
 from shiplog.diagnosis.trial.trial import Numbers, Trial
 from shiplog.models.causes import Cause
@@ -28,10 +28,11 @@ NO_CHANGE_OF_NOISE = Remainder()
 
 
 def begin(trial: Trial, numbers: Numbers) -> tuple[Trial, Point]:
-    """The trial with weights of its segments, and the model as it stands, its path held as firmly
-    as the process noise then found allows, and linearised again until the evidence stays: causes
-    must not gain by a path that converges with them. Segments on which the model diverges carry no
-    information. Raises np.linalg.LinAlgError where it diverges on all."""
+    """The trial with weights of its segments, and the model as it stands, linearised.
+
+    The path is limited by the process noise that was estimated about the path before, until the
+    evidence stays: causes must not gain by a path that converges with them. Segments on which the
+    model diverges carry no information. Raises np.linalg.LinAlgError where it diverges on all."""
     first = trial.at(numbers)
     trial = replace(trial.leaving_out(first.linear.lost), first=first)
     trial = replace(trial, weight=robust(trial, first))
@@ -48,173 +49,191 @@ def begin(trial: Trial, numbers: Numbers) -> tuple[Trial, Point]:
 
 
 def robust(trial: Trial, point: Point) -> np.ndarray:
-    """Weights [S] of the segments, the same for every hypothesis: a few must not decide."""
+    """Weights [S] of the segments by their χ² at the posterior mean, A⁻¹ b (7). They are the same
+    for every hypothesis: a few segments must not decide."""
     best = max(levels(trial, point), key=lambda one: one.value)
     none = np.zeros(trial.unseen.count)
     unit = np.append(trial.reference.columns.unit, none)
-    d = np.append(best.solution[: len(trial.reference.pull)], none)
+    d = np.append(best.mean[: len(trial.reference.pull)], none)
     modes, noise = trial.products.modes(point, best.noise_factor, NO_CHANGE_OF_NOISE)
     return robust_weights(squares(modes, d * unit, noise), trial.weight > 0.0)
+
+
+# --- one factor of the process noise
 
 
 def level(
     trial: Trial, point: Point, noise: float, included: Sequence[str] = (),
     remainder: Remainder = NO_CHANGE_OF_NOISE,
 ) -> Level:  # fmt: skip
-    """The base hypothesis at one level of process noise."""
+    """The base hypothesis at one factor λ = `noise` of the process noise.
+
+    Its value is log Z (3) + log p(λ) + the share of the bounds (13)."""
     assert trial.first is not None
-    total, _ = trial.products.total(point, noise, trial.weight, remainder)
-    volume = trial.products.volume(trial.first, noise, trial.weight, remainder)
-    found = solve(trial, total, volume, noise, point, included, remainder)
-    value = found.value + noise_prior(noise, trial.nominal_spread, remainder)
-    share = _within(trial, found, point, included)
-    return replace(found, value=value + share, share=share)
+    G, _ = trial.products.total(point, noise, trial.weight, remainder)
+    log_R = trial.products.volume(trial.first, noise, trial.weight, remainder)
+    one = solve(trial, G, log_R, noise, point, included, remainder)
+    log_Z = one.value + noise_prior(noise, trial.nominal_spread, remainder)
+    share = _log_share_of_bounds(trial, one, point, included)
+    return replace(one, value=log_Z + share, share=share)
 
 
 def solve(
-    trial: Trial, total: np.ndarray, volume: float, noise: float, point: Point,
+    trial: Trial, G: np.ndarray, log_R: float, noise: float, point: Point,
     included: Sequence[str], remainder: Remainder,
 ) -> Level:  # fmt: skip
-    """The base hypothesis of a trial's products [1 + C, 1 + C], its level of noise as likely as any
-    other. The reference says for how much of itself the trial counts."""
-    ref = trial.reference
-    columns, information, pull = ref.columns, ref.information, ref.pull
-    total, volume = ref.counts * total, ref.counts * volume
-    extra = [columns.of[name] for name in included]
+    """Posterior (7) and evidence (3) of the base hypothesis, every λ as likely as any other.
+
+        A = P⁻¹ + c Hᵀ R⁻¹ H,   b = P⁻¹ μ + c Hᵀ R⁻¹ r
+        log Z = -½ (c rᵀ R⁻¹ r + μᵀ P⁻¹ μ - bᵀ A⁻¹ b + log|A| - log|P⁻¹| + c log|R|)
+
+    G      [1 + C, 1 + C]  [r J]ᵀ R⁻¹ [r J] over all C columns of the trial; H are N of them
+    log_R  log|R|
+    noise  λ, of which G and log|R| are
+    """
+    c = trial.reference.counts
+    chosen = np.append(0, 1 + _columns(trial, included, remainder))
+    G = (c * G)[np.ix_(chosen, chosen)]
+    prior = _prior(trial, point, included, remainder)
+    A, b = G[1:, 1:] + prior.P_inv, G[1:, 0] + prior.P_inv_mu
+    A_inv = np.linalg.inv(A)
+    mean = A_inv @ b
+    square = G[0, 0] + prior.square - b @ mean
+    log_S = np.linalg.slogdet(A)[1] - prior.log_P_inv
+    return Level(noise, G, A_inv, mean, -0.5 * float(square + log_S + c * log_R))
+
+
+@dataclass(frozen=True)
+class _Prior:
+    """θ ~ N(μ, P) of a base hypothesis (1).
+
+    P_inv      [N, N]  P⁻¹
+    P_inv_mu   [N]     P⁻¹ μ
+    square     μᵀ P⁻¹ μ
+    log_P_inv  log|P⁻¹|
+    """
+
+    P_inv: np.ndarray
+    P_inv_mu: np.ndarray
+    square: float
+    log_P_inv: float
+
+
+def _prior(
+    trial: Trial, point: Point, included: Sequence[str], remainder: Remainder
+) -> _Prior:  # fmt: skip
+    """Of nominal numbers the posterior of the campaign; of a cause N(-θ₀, I), since its numbers θ
+    are counted from the point, where they are θ₀; of a family's weights N(0, size² I). The model's
+    own causes are held."""
+    ref, unit = trial.reference, trial.reference.columns.unit
+    columns = [ref.columns.of[name] for name in included]
     family = trial.families.get(remainder.kind, np.zeros(0, int))
-    held = [np.full(len(c), HELD_INFORMATION if n in trial.fixed else 1.0)
-            for n, c in zip(included, extra, strict=True)]  # fmt: skip
-    held.append(np.full(len(family), remainder.size**-2.0))
-    own = np.concatenate(held)
-    count = len(pull)
-    chosen = np.concatenate((np.arange(count), *extra, family)).astype(int)
-    gram = total[np.ix_(np.append(0, 1 + chosen), np.append(0, 1 + chosen))]
-    known = np.zeros((len(chosen), len(chosen)))
-    known[:count, :count] = information
-    known[count:, count:] = np.diag(own)
-    # the included numbers are counted from where they were linearised
-    before = [
-        np.zeros(len(c)) if n in trial.fixed
-        else -np.asarray(point.numbers.get(n, np.zeros(len(c)))) / columns.unit[c]
-        for n, c in zip(included, extra, strict=True)
+    precisions = [
+        np.full(len(of), HELD_INFORMATION if name in trial.fixed else 1.0)
+        for name, of in zip(included, columns, strict=True)
+    ]
+    precisions.append(np.full(len(family), remainder.size**-2.0))
+    precision, nominal = np.concatenate(precisions), len(ref.pull)
+    N = nominal + len(precision)
+    P_inv = np.zeros((N, N))
+    P_inv[:nominal, :nominal] = ref.information
+    P_inv[nominal:, nominal:] = np.diag(precision)
+    mu = [
+        np.zeros(len(of)) if name in trial.fixed
+        else -np.asarray(point.numbers.get(name, np.zeros(len(of)))) / unit[of]
+        for name, of in zip(included, columns, strict=True)
     ]  # fmt: skip
-    towards = np.concatenate((pull, *(k * b for k, b in zip(held, before, strict=False)),
-                              np.zeros(len(family))))  # fmt: skip
-    both = gram[1:, 1:] + known
-    inverse = np.linalg.inv(both)
-    solution = inverse @ (gram[1:, 0] + towards)
-    of_prior = float(towards[:count] @ ref.mean + (towards[count:] ** 2 / own).sum())
-    square = gram[0, 0] + of_prior - (gram[1:, 0] + towards) @ solution
-    gained = np.linalg.slogdet(both)[1] - (ref.information_volume + float(np.log(own).sum()))
-    value = -0.5 * float(square + gained + volume)
-    return Level(noise, gram, inverse, solution, value)
+    P_inv_mu = np.concatenate((
+        ref.pull, *(p * m for p, m in zip(precisions, mu, strict=False)), np.zeros(len(family)),
+    ))  # fmt: skip
+    square = float(P_inv_mu[:nominal] @ ref.mean + (P_inv_mu[nominal:] ** 2 / precision).sum())
+    return _Prior(P_inv, P_inv_mu, square, ref.information_volume + float(np.log(precision).sum()))
 
 
-def levels(
-    trial: Trial, point: Point, included: Sequence[str] = (), near: float | None = None,
-    remainder: Remainder = NO_CHANGE_OF_NOISE,
-) -> list[Level]:  # fmt: skip
-    """From the nominal process noise outwards while it gets likelier; finely about the best.
-    `near`: about there only."""
-    tried: dict[float, Level] = {}
-
-    def at(noise: float) -> float:
-        if noise not in tried:
-            tried[noise] = level(trial, point, noise, included, remainder)
-        return tried[noise].value
-
-    if near is None:
-        middle = NOISES.index(1.0)
-        best = middle
-        for way in (1, -1):
-            i = middle
-            while 0 <= i + way < len(NOISES) and at(NOISES[i + way]) > at(NOISES[i]):
-                i += way
-            if at(NOISES[i]) > at(NOISES[best]):
-                best = i
-            if best != middle:
-                break
-        here = NOISES[best]
-    else:
-        here = near
-    below, middle_value, above = at(here / FINE_STEP), at(here), at(here * FINE_STEP)
-    bend = below - 2.0 * middle_value + above
-    top = float(np.clip(0.5 * (below - above) / bend, -3.0, 3.0)) if bend < 0.0 else 0.0
-    if abs(top) > 1.0:  # of the parabola through them, and beyond them
-        at(here * FINE_STEP**top)
-    return list(tried.values())
+def _columns(trial: Trial, included: Sequence[str], remainder: Remainder) -> np.ndarray:
+    """[N] columns of H among the trial's C: all nominal numbers, causes, a family's weights."""
+    ref = trial.reference
+    causes = (ref.columns.of[name] for name in included)
+    family = trial.families.get(remainder.kind, np.zeros(0, int))
+    return np.concatenate((np.arange(len(ref.pull)), *causes, family)).astype(int)
 
 
-def scan(
-    trial: Trial, point: Point, candidates: Sequence[Cause], included: Sequence[str] = (),
-    near: float | None = None, remainder: Remainder = NO_CHANGE_OF_NOISE,
-) -> tuple[Found, list[Found]]:  # fmt: skip
-    """The base hypothesis, and each candidate in addition to it, each at its own best level."""
-    tried = levels(trial, point, included, near, remainder)
-    best = max(tried, key=lambda one: one.value)
-    found = []  # a cause that explains makes the process noise fall: each level is tried
-    for cause in candidates:
-        each = [_with(trial, one, cause.label) for one in tried]
-        found.append(max(each, key=lambda f: f.evidence))
-    moved = [replace(f, evidence=f.evidence - best.value) for f in found]
-    return _found(trial, best, point, included), sorted(moved, key=lambda f: -f.evidence)
+# --- more numbers, by a Schur complement
 
 
-def fit(
-    trial: Trial, point: Point, included: Sequence[str], noise: float, remainder: Remainder
-) -> Found:
-    """The base hypothesis at one level of process noise."""
-    return _found(trial, level(trial, point, noise, included, remainder), point, included)
+def candidate(trial: Trial, one: Level, label: str) -> Found:
+    """One cause x ~ N(0, I) in addition to a base hypothesis: (10) to (12) with σ = 1, and (13).
 
+        log Bayes factor = ½ yᵀ (M + I)⁻¹ y - ½ log|M + I|,   x | r ~ N((M + I)⁻¹ y, (M + I)⁻¹)
 
-def _found(trial: Trial, one: Level, point: Point, included: Sequence[str]) -> Found:
-    numbers, covariance = numbers_of(trial, one, point, included)
-    density = one.value - one.share - _gained(trial, one, included)
-    return Found("nothing", one.value, one.noise_factor, numbers, covariance, density=density)
-
-
-def _gained(trial: Trial, one: Level, included: Sequence[str]) -> float:
-    """Log evidence less the log density of the numbers that the point was linearised at."""
-    columns, first = trial.reference.columns, len(trial.reference.pull)
-    own = slice(first, first + sum(len(columns.of[n]) for n in included))
-    step, spread = one.solution[own], one.inverse[own, own]
-    return 0.5 * float(step @ np.linalg.solve(spread, step) + np.linalg.slogdet(spread)[1])
-
-
-def _with(trial: Trial, one: Level, label: str) -> Found:
-    """One cause more, its change from the nominal with a prior of its size."""
+    To expect of x before any data are ½ |(M + I)^-½ M x|² - cost nats, with the cost
+    ½ log|M + I| - ½ tr M (M + I)⁻¹.
+    """
     columns = trial.reference.columns.of[label]
-    joined = one.gram[1:, 1:][:, columns]
-    pull = one.gram[1:, 0][columns] - joined.T @ one.solution
-    own = joined[columns] - joined.T @ one.inverse @ joined + np.eye(len(columns))
-    value = np.linalg.solve(own, pull)
-    cost = 0.5 * float(np.linalg.slogdet(own)[1])
-    gained = 0.5 * float(pull @ value) - cost
     unit = trial.reference.columns.unit[columns]
-    left = np.linalg.inv(own)
+    identity = np.eye(len(columns))
+    B = one.G[1:, 1:][:, columns]
+    y = one.G[1:, 0][columns] - B.T @ one.mean
+    M_and_I = B[columns] - B.T @ one.covariance @ B + identity
+    x = np.linalg.solve(M_and_I, y)
+    half_log = 0.5 * float(np.linalg.slogdet(M_and_I)[1])
+    nats = 0.5 * float(y @ x) - half_log
+    covariance = np.linalg.inv(M_and_I)
     low, high = (bound / unit for bound in trial.bounds(label))
-    gained += bounds.log_share(value, _deviation(left), np.ones(len(unit)), low, high)
+    nats += bounds.log_share(x, _deviations(covariance), np.ones(len(unit)), low, high)
     farthest = trial.farthest(label) * unit[0] / unit[-1]
     if math.isfinite(farthest):
-        gained += bounds.log_on_board(value, left, np.ones(len(unit)), farthest)
-        value = bounds.on_board(value, left, farthest)
-    value = bounds.within(value, left, low, high)
-    information = own - np.eye(len(columns))
-    shrunk = information @ left
+        nats += bounds.log_on_board(x, covariance, np.ones(len(unit)), farthest)
+        x = bounds.on_board(x, covariance, farthest)
+    x = bounds.within(x, covariance, low, high)
+    M = M_and_I - identity
+    M_shrunk = M @ covariance
     expected = ExpectedEvidence(
-        np.diagonal(shrunk @ information).copy(), cost - 0.5 * float(np.trace(shrunk))
+        np.diagonal(M_shrunk @ M).copy(), half_log - 0.5 * float(np.trace(M_shrunk))
     )
     return Found(
-        label, one.value + gained, one.noise_factor, {label: value * unit},
-        left * np.outer(unit, unit), expected,
+        label, one.value + nats, one.noise_factor, {label: x * unit},
+        covariance * np.outer(unit, unit), expected,
     )  # fmt: skip
+
+
+def family_change(
+    trial: Trial, point: Point, one: Level, included: tuple[str, ...], family: str,
+    remainder: Remainder,
+) -> tuple[float, float]:  # fmt: skip
+    """A change w ~ N(0, σ² I) of one family's weights in addition to a base hypothesis: its log
+    Bayes factor (12) at the most probable σ of `CHANGE_SIZES`, and this σ.
+
+        ½ σ² yᵀ (σ² M + I)⁻¹ y - ½ log|σ² M + I|
+
+    one   the base hypothesis with that `remainder`
+    """
+    ref, c = trial.reference, trial.reference.counts
+    W = 1 + trial.families[family]
+    H = 1 + np.concatenate([np.arange(len(ref.pull)), *(ref.columns.of[n] for n in included)])
+    G, _ = trial.products.total(
+        point, one.noise_factor, trial.weight, replace(remainder, kind=family)
+    )
+    B = c * G[np.ix_(H, W)]
+    y = c * G[W, 0] - B.T @ one.mean
+    M = c * G[np.ix_(W, W)] - B.T @ one.covariance @ B
+    tried = []
+    for size in CHANGE_SIZES:
+        inner = size**2 * M + np.eye(len(M))
+        square = 0.5 * size**2 * float(y @ np.linalg.solve(inner, y))
+        tried.append((square - 0.5 * float(np.linalg.slogdet(inner)[1]), size))
+    return max(tried)
+
+
+# --- numbers of a posterior
 
 
 def numbers_of(
     trial: Trial, one: Level, point: Point, included: Sequence[str]
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Numbers of the included causes within their bounds, and covariance."""
-    mean, covariance = _free(trial, one, point, included)
+    """Label → most probable numbers [q] of each included cause within its bounds, SI, and their
+    covariance [Q, Q] without bounds, from (7)."""
+    mean, covariance = _unbounded(trial, one, point, included)
     if not included:
         return {}, covariance
     limits = [trial.bounds(name) for name in included]
@@ -224,38 +243,54 @@ def numbers_of(
         for name, at in zip(included, (0, *ends), strict=True):
             if math.isfinite(trial.farthest(name)):
                 mean = bounds.on_board(mean, covariance, trial.farthest(name), int(at))
-    found = bounds.within(mean, covariance, low, high)
-    return dict(zip(included, np.split(found, ends), strict=True)), covariance
+    mode = bounds.within(mean, covariance, low, high)
+    return dict(zip(included, np.split(mode, ends), strict=True)), covariance
 
 
-def _free(
+def log_density(trial: Trial, one: Level, included: Sequence[str]) -> float:
+    """Log density of the data and of the causes' numbers at the point itself.
+
+        log p(r, θ₀) = log Z - ½ Δᵀ Σ⁻¹ Δ - ½ log|Σ|
+
+    with Δ [Q] the step from the point to the posterior mean, and Σ [Q, Q] the covariance of the
+    causes' numbers (7). The share of the bounds is left out."""
+    columns, first = trial.reference.columns, len(trial.reference.pull)
+    own = slice(first, first + sum(len(columns.of[n]) for n in included))
+    step, sigma = one.mean[own], one.covariance[own, own]
+    square = step @ np.linalg.solve(sigma, step)
+    return one.value - one.share - 0.5 * float(square + np.linalg.slogdet(sigma)[1])
+
+
+def _unbounded(
     trial: Trial, one: Level, point: Point, included: Sequence[str]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers [Q] of the included causes and their covariance, were they without bounds; a
-    family's weights come after them."""
+    """Posterior mean [Q] and covariance [Q, Q] of the included causes' numbers, SI (7)."""
     columns = trial.reference.columns
     none = np.zeros(0)
     unit = np.concatenate([none, *(columns.unit[columns.of[name]] for name in included)])
-    stood = [point.numbers.get(name, np.zeros(len(columns.of[name]))) for name in included]
+    at_point = [point.numbers.get(name, np.zeros(len(columns.of[name]))) for name in included]
     first = len(trial.reference.pull)
     own = slice(first, first + len(unit))
-    mean = np.concatenate([none, *stood]) + one.solution[own] * unit
-    return mean, one.inverse[own, own] * np.outer(unit, unit)
+    mean = np.concatenate([none, *at_point]) + one.mean[own] * unit
+    return mean, one.covariance[own, own] * np.outer(unit, unit)
 
 
-def _deviation(covariance: np.ndarray) -> np.ndarray:
+def _deviations(covariance: np.ndarray) -> np.ndarray:
     """[Q] standard deviations. Rounding may leave a variance of nearly known numbers below zero:
     these count as known."""
     return np.sqrt(np.maximum(np.diagonal(covariance), 1e-30))
 
 
-def _within(trial: Trial, one: Level, point: Point, included: Sequence[str]) -> float:
-    """What the causes' bounds add to the log evidence; of the model's own causes nothing."""
+def _log_share_of_bounds(
+    trial: Trial, one: Level, point: Point, included: Sequence[str]
+) -> float:  # fmt: skip
+    """What the bounds of the causes add to the log evidence (13); of the model's own causes
+    nothing."""
     columns, at, share = trial.reference.columns, 0, 0.0
     if set(included) <= set(trial.fixed):
         return share
-    mean, covariance = _free(trial, one, point, included)
-    deviation = _deviation(covariance)
+    mean, covariance = _unbounded(trial, one, point, included)
+    deviation = _deviations(covariance)
     for name in included:
         size = columns.unit[columns.of[name]]
         own, at = slice(at, at + len(size)), at + len(size)
@@ -266,3 +301,71 @@ def _within(trial: Trial, one: Level, point: Point, included: Sequence[str]) -> 
                     mean[own], covariance[own, own], size, trial.farthest(name)
                 )
     return share
+
+
+# --- over the factors of the process noise
+
+
+def levels(
+    trial: Trial, point: Point, included: Sequence[str] = (), near: float | None = None,
+    remainder: Remainder = NO_CHANGE_OF_NOISE,
+) -> list[Level]:  # fmt: skip
+    """The base hypothesis at each λ that is tried: from 1 outwards while log Z(λ) + log p(λ) rises,
+    then finely about the best, at the top of the parabola through three of them.
+
+    near   λ about which alone it is tried"""
+    tried: dict[float, Level] = {}
+
+    def log_Z(noise: float) -> float:
+        if noise not in tried:
+            tried[noise] = level(trial, point, noise, included, remainder)
+        return tried[noise].value
+
+    here = near
+    if here is None:
+        middle = NOISES.index(1.0)
+        best = middle
+        for way in (1, -1):
+            i = middle
+            while 0 <= i + way < len(NOISES) and log_Z(NOISES[i + way]) > log_Z(NOISES[i]):
+                i += way
+            if log_Z(NOISES[i]) > log_Z(NOISES[best]):
+                best = i
+            if best != middle:
+                break
+        here = NOISES[best]
+    below, at, above = log_Z(here / FINE_STEP), log_Z(here), log_Z(here * FINE_STEP)
+    bend = below - 2.0 * at + above
+    top = float(np.clip(0.5 * (below - above) / bend, -3.0, 3.0)) if bend < 0.0 else 0.0
+    if abs(top) > 1.0:  # of the parabola through them, and beyond them
+        log_Z(here * FINE_STEP**top)
+    return list(tried.values())
+
+
+def scan(
+    trial: Trial, point: Point, candidates: Sequence[Cause], included: Sequence[str] = (),
+    near: float | None = None, remainder: Remainder = NO_CHANGE_OF_NOISE,
+) -> tuple[Found, list[Found]]:  # fmt: skip
+    """The base hypothesis at its most probable λ; and each candidate in addition to it, at its
+    own, with its log Bayes factor as its evidence, the greatest first."""
+    tried = levels(trial, point, included, near, remainder)
+    best = max(tried, key=lambda one: one.value)
+    found = []  # a cause that explains makes the process noise fall: each level is tried
+    for cause in candidates:
+        each = [candidate(trial, one, cause.label) for one in tried]
+        found.append(max(each, key=lambda one: one.evidence))
+    over_base = [replace(one, evidence=one.evidence - best.value) for one in found]
+    return _found(trial, best, point, included), sorted(over_base, key=lambda one: -one.evidence)
+
+
+def fit(
+    trial: Trial, point: Point, included: Sequence[str], noise: float, remainder: Remainder
+) -> Found:
+    """The base hypothesis at one factor λ = `noise` of the process noise."""
+    return _found(trial, level(trial, point, noise, included, remainder), point, included)
+
+
+def _found(trial: Trial, one: Level, point: Point, included: Sequence[str]) -> Found:
+    numbers, covariance = numbers_of(trial, one, point, included)
+    density = log_density(trial, one, included)
+    return Found("nothing", one.value, one.noise_factor, numbers, covariance, density=density)

@@ -1,4 +1,18 @@
-"""A hypothesis about a trial: a set of causes and one kind of remainder, with its prior."""
+"""A hypothesis about a trial: a set of causes and one kind of remainder, with its prior.
+
+    p(no cause) = NO_CHANGE
+    p(n causes) = (1 - NO_CHANGE) ANOTHER_CAUSEⁿ⁻¹ n! Π p_c       n! orders are one set
+    p_c = 1 / (names in the catalogue · labels of this name)
+    p(kind) = REMAINDER / (kinds but nominal);   p(nominal) = 1 - REMAINDER
+
+The form error (nats) is an allowance for causes that imitate what the equations of another one
+leave: nats go with the square of a force.
+
+    (n - 1) max_c f_c² log B_c,   or FORM_ERROR² log B_force n where that is more
+
+with f_c the share of a cause's force that its equations may leave wrong, and B_c its Bayes factor
+by itself.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +28,8 @@ from shiplog.diagnosis.linear.linear_segments import Path
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
 from shiplog.diagnosis.trial.fitted import Found, Point
 from shiplog.models.causes import Cause
+
+Key = tuple[tuple[str, ...], str]  # causes by label, in alphabetical order, and kind of remainder
 
 
 @dataclass(frozen=True)
@@ -67,7 +83,11 @@ def holds_one(without: Collection[frozenset[str]], labels: Sequence[str]) -> boo
 
 
 class Priors:
-    """Log prior of every hypothesis about one ship; causes of one name share that name's."""
+    """Log prior of every hypothesis about one ship; causes of one name share that name's.
+
+    each    label → log p_c
+    kinds   kind of remainder → log p(kind)
+    """
 
     def __init__(self, catalogue: Sequence[Cause], families: Sequence[str]) -> None:
         names = [name_of(cause.label) for cause in catalogue]
@@ -80,18 +100,20 @@ class Priors:
         self.kinds[NOMINAL] = math.log(1.0 - thresholds.REMAINDER)
 
     def causes(self, labels: Sequence[str]) -> float:
+        """log p(n causes)."""
         if not labels:
             return math.log(thresholds.NO_CHANGE)
         further = (len(labels) - 1) * math.log(thresholds.ANOTHER_CAUSE)
         further += math.lgamma(len(labels) + 1.0)  # n! orders of n causes are one set
         return math.log(1.0 - thresholds.NO_CHANGE) + further + sum(self.each[n] for n in labels)
 
-    def of(self, labels: Sequence[str], kind: str) -> float:
+    def hypothesis(self, labels: Sequence[str], kind: str) -> float:
+        """log p(causes) + log p(kind)."""
         return self.causes(labels) + self.kinds[kind]
 
 
 def form_error_of(cause: Cause) -> float:
-    """Share of its force or reading that a cause's equations may leave wrong."""
+    """f_c: share of its force or reading that a cause's equations may leave wrong."""
     return max(thresholds.FORM_ERROR, cause.form_error)
 
 
@@ -101,9 +123,9 @@ def form_error(
     """Allowance, in nats, for further causes that imitate the form error of another one, or of an
     intermittent force: of the one that leaves most.
 
-    alone   log Bayes factor of each cause by itself, over no cause
+    alone   log B_c of each cause by itself, over no cause
     by      label → cause
-    force   log Bayes factor of an intermittent force by itself, where these causes act with one
+    force   log B_force of an intermittent force by itself, where these causes act with one
     """
     left = (form_error_of(by[n]) ** 2 * alone.get(n, 0.0) for n in labels)
     of_causes = max(0.0, *left) * (len(labels) - 1) if len(labels) > 1 else 0.0

@@ -2,11 +2,18 @@
 
 Random forces on a ship often act at one place, and in bursts. In rougher weather the same forces
 are larger, and no device is at work.
+
+The acceleration a at the nodes of a segment is process noise n and that of the force f:
+
+    a = n + f,   n ~ N(0, λ² Q_n),   f ~ N(0, Q_f),   Q = λ² Q_n + Q_f                   (1)
+    f | a ~ N(K a, Q_f - K Q_f),   K = Q_f Q⁻¹                                      gain (2)
+    f | r ~ N(K â, K V Kᵀ + Q_f - K Q_f)                    with a | r ~ N(â, V) [3J, 3J] (3)
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -32,26 +39,59 @@ NO_NOISE = 1e-9  # of the process noise, that leaves the intermittent force by i
 VARIES = 1.0  # time between over time on, from which a force merely varies: a Gaussian one has 1.13
 
 
+@dataclass(frozen=True)
+class ResidualNoise:
+    """Estimates of the noise that explains the residual of a fit.
+
+    at_one_place  whether nominal process noise that acts at one place is looked for: it is then
+                  raised with the rest
+    """
+
+    trial: Trial
+    at_one_place: bool = True
+
+    @cached_property
+    def nominal(self) -> Remainder | None:
+        """As `nominal_side_force`."""
+        if not self.at_one_place:
+            return None
+        return nominal_side_force(self.trial.campaign, self.trial.grid)
+
+    def raised(self, fit: Fit) -> Remainder:
+        """Process noise raised in each channel by itself."""
+        return raised_noise.by_channel(noise_left(self.trial, fit), self.nominal)[1]
+
+    def side_force(self, fit: Fit) -> SideForce:
+        """As `side_force`, with its log Bayes factor over raised noise, whose nominal part acts at
+        one place too."""
+        return side_force(self.trial, fit, self.nominal)
+
+    def add_pattern(self, fit: Fit, force: SideForce) -> SideForce:
+        """As `add_pattern`."""
+        return add_pattern(self.trial, fit, force)
+
+
 def nominal_side_force(campaign: Campaign, g: SegmentGrid) -> Remainder | None:
     """Nominal process noise that acts at one place; None where independent noise in each channel is
     more probable.
 
-    Each part's numbers are predicted by the other voyages and itself, as a trial's are.
+    The residual of each part is left by its own posterior mean A⁻¹ b, (6) and (7) of this room,
+    with the other voyages as its prior, as for a trial.
     """
     reference = campaign.reference
     linear = reference.nominal
     if linear is None or not campaign.weight.sum():
         return None
     accelerations = campaign.discrepancy.accelerations(linear.cut, g)
-    unit, share = reference.columns.unit, reference.counts
-    own = np.empty((len(linear.e), len(unit)))
+    unit, c = reference.columns.unit, reference.counts
+    d = np.empty((len(linear.e), len(unit)))
     names = np.unique(campaign.voyage)
     for rows, part, voyage in zip(campaign.rows, campaign.parts, campaign.voyage, strict=True):
         left_out = int(np.searchsorted(names, voyage))
-        information, pull = campaign.prior_without(left_out, campaign.apart)
-        gram = share * part[: 1 + len(pull), : 1 + len(pull)]
-        own[rows] = np.linalg.solve(gram[1:, 1:] + information, gram[1:, 0] + pull) * unit
-    left, none = linear.less_numbers(own, accelerations), np.zeros(linear.j.shape[-1])
+        P_inv, P_inv_mu = campaign.prior_without(left_out, campaign.apart)
+        G = c * part[: 1 + len(P_inv_mu), : 1 + len(P_inv_mu)]
+        d[rows] = np.linalg.solve(G[1:, 1:] + P_inv, G[1:, 0] + P_inv_mu) * unit
+    left, none = linear.less_numbers(d, accelerations), np.zeros(linear.j.shape[-1])
     kept = raised_noise.left_by(
         left, none, reference.process_noise, campaign.weight, reference.counts
     )
@@ -60,15 +100,17 @@ def nominal_side_force(campaign: Campaign, g: SegmentGrid) -> Remainder | None:
 
 
 def side_force(trial: Trial, fit: Fit, at_one_place: Remainder | None = None) -> SideForce:
-    """Of what a hypothesis leaves; `at_one_place` as `raised_noise.by_channel` has it. It is on or
-    off where its pattern may be that of a device, and such a course is more probable: that of this
-    estimate, or the one that the hypothesis has."""
+    """The most probable intermittent side force in the residual of a hypothesis.
+
+    It is on or off where its pattern may be that of a device, and such a course is more probable:
+    that of this estimate, or the one that the hypothesis has. `at_one_place` as
+    `raised_noise.by_channel` has it."""
     left = noise_left(trial, fit)
     found = unrecorded_thruster.estimate_side_force(left, trial.reference, at_one_place)
     if found.gain <= 0.0:
         return found
     force, deviation = force_at_nodes(trial, fit, found, trial.process_noise(found.remainder))
-    found = replace(found, device=of_one_device(force, deviation))
+    found = replace(found, device=device_probability(force, deviation))
     if found.device == 0.0:
         return found
     kept = trial.weight > 0.0
@@ -83,48 +125,49 @@ def side_force(trial: Trial, fit: Fit, at_one_place: Remainder | None = None) ->
 
 
 def noise_left(trial: Trial, fit: Fit) -> Left:
-    """What a hypothesis leaves, to be explained by noise."""
+    """The residual r - W w - J d of a hypothesis, to be explained by noise."""
     left, d = fits.residual(trial, fit.point.linear, fit)
     ref = trial.reference
     return raised_noise.left_by(left, d, ref.process_noise, trial.weight, ref.counts)
 
 
-def with_pattern(trial: Trial, fit: Fit, side_force: SideForce) -> SideForce:
-    """The same with the probability that it is one device's; `fit` has it in its remainder. Of a
-    force that is on or off, the course was found with that probability."""
+def add_pattern(trial: Trial, fit: Fit, side_force: SideForce) -> SideForce:
+    """The force with the probability that it is that of one device, by its pattern; `fit` has the
+    force in its remainder. Of a force that is on or off, the course was found with it."""
     if side_force.course is not None:
         return side_force
-    return replace(side_force, device=of_one_device(*force_at_nodes(trial, fit, side_force)))
+    return replace(side_force, device=device_probability(*force_at_nodes(trial, fit, side_force)))
 
 
 def force_at_nodes(
     trial: Trial, fit: Fit, side_force: SideForce, process_noise: ProcessNoise | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Force of the unrecorded thruster at the knots and its standard deviation [S, J] in N; of a
-    hypothesis whose remainder has it, or in the given process noise that has it."""
+    """Mean and standard deviation (3) of the unrecorded thruster's force at the nodes [S, J], N.
+
+    It is that of a hypothesis whose remainder has it, or in the given process noise that has it."""
     if process_noise is None:
         process_noise = trial.process_noise(fit.remainder).times(fit.found.noise_factor)
     left = fits.residual(trial, fit.point.linear, fit)
     z, covariance = likelihood.starts_and_knots(*left, process_noise)
-    knots = trial.grid.knots
-    kernel = process_noise.kernel(knots)
-    alone = replace(process_noise, acceleration=NO_NOISE * process_noise.acceleration)
-    intermittent = alone.kernel(knots)
-    share = intermittent @ np.linalg.inv(kernel)
-    accelerations = (share @ z[:, 6:, None]).reshape(len(z), 3, knots)
-    sway = slice(knots, 2 * knots)
-    beyond = (intermittent - share @ intermittent)[..., sway, sway]
-    of_sway = share[..., sway, :]
-    known = of_sway @ covariance[:, 6:, 6:] @ np.swapaxes(of_sway, -1, -2)
-    variance = np.diagonal(known + beyond, axis1=1, axis2=2)
-    return accelerations[:, 1] / side_force.unit[1], np.sqrt(
-        np.maximum(variance, 0.0)
-    ) / side_force.unit[1]
+    a, V, J = z[:, 6:, None], covariance[:, 6:, 6:], trial.grid.knots
+    Q = process_noise.kernel(J)
+    force_alone = replace(process_noise, acceleration=NO_NOISE * process_noise.acceleration)
+    Q_f = force_alone.kernel(J)
+    K = Q_f @ np.linalg.inv(Q)
+    mean = (K @ a).reshape(len(z), 3, J)
+    sway = slice(J, 2 * J)
+    not_in_a = (Q_f - K @ Q_f)[..., sway, sway]
+    K_sway = K[..., sway, :]
+    variance = np.diagonal(
+        K_sway @ V @ np.swapaxes(K_sway, -1, -2) + not_in_a, axis1=1, axis2=2
+    )  # fmt: skip
+    newton = side_force.unit[1]  # sway acceleration of 1 N
+    return mean[:, 1] / newton, np.sqrt(np.maximum(variance, 0.0)) / newton
 
 
 def active_intervals(trial: Trial, fit: Fit, side_force: SideForce) -> list[dict]:
     """When the unrecorded thruster worked: voyage, start_s, end_s, strongest force_N and its sd_N.
-    It starts and stops between two knots, on average half of the time between them away."""
+    It starts and stops between two nodes, on average half of the time between them away."""
     force, sd = force_at_nodes(trial, fit, side_force)
     rows = segment_nodes.rows_at_knots(trial.rows, trial.grid)
     course = side_force.course or on_off.course(force, np.abs(sd), rows)
@@ -143,9 +186,9 @@ def active_intervals(trial: Trial, fit: Fit, side_force: SideForce) -> list[dict
     return times
 
 
-def of_one_device(force: np.ndarray, deviation: np.ndarray) -> float:
-    """Probability that a side force [S, J], N, is that of one device, which is on or off: one,
-    zero, or a half where its pattern is between both.
+def device_probability(force: np.ndarray, deviation: np.ndarray) -> float:
+    """Probability 1, ½ or 0 that a side force [S, J], N, is that of one device, which is on or
+    off; ½ where its pattern is between both.
 
     A force that merely varies is between its extremes for much of the time: a Gaussian one is 1.13
     times as long between 0.2 and 0.5 of its 95 % quantile as above. A device is hardly ever

@@ -1,5 +1,8 @@
 """The search: which hypotheses are weighed, starting from the best ones so far.
 
+The loop takes the best hypothesis, asks for its candidates (`additions`, `reductions`), weighs each
+(`weighing.weigh`), and puts what comes back into the table.
+
 Each set of causes is linearised again at its most probable numbers, and weighed under every kind of
 remainder. One cause is then added to the best hypotheses or dropped from them, until no promising
 set is left. A remainder may explain a part of what a cause explains wholly. As long as a cause
@@ -10,16 +13,19 @@ order in which sets are weighed matters for those alone that are far behind.
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from shiplog.diagnosis import thresholds
+from shiplog.diagnosis.decision_parts import ALL, Parts
 from shiplog.diagnosis.hypotheses import evidence
 from shiplog.diagnosis.hypotheses.hypothesis import Hypothesis, holds_one, name_of
-from shiplog.diagnosis.hypotheses.table import Hypotheses
-from shiplog.diagnosis.hypotheses.weighing import SEARCH_NATS, weigh, weigh_as
-from shiplog.diagnosis.noise.remainder import NOMINAL
+from shiplog.diagnosis.hypotheses.intermittent import ResidualNoise
+from shiplog.diagnosis.hypotheses.table import Hypotheses, rescored, shortened
+from shiplog.diagnosis.hypotheses.weighing import SEARCH_NATS, CauseSet, weigh, weigh_as
+from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED
 from shiplog.diagnosis.trial.fitted import ExpectedEvidence, Fit, Point
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.models.causes import Cause
@@ -30,13 +36,16 @@ LIKELY = 0.3  # share of the best one's evidence: before it is linearised a caus
 CONTENDERS = 3  # causes that are tried from one hypothesis
 
 
+Addition = tuple[tuple[str, ...], dict[str, np.ndarray], float]
+
 log = logging.getLogger(__name__)
 
 
 class Search:
-    """The moves from set to set.
+    """The moves from set to set: candidates of a hypothesis are weighed, and put into the table.
 
     table     the hypotheses weighed so far
+    noise     estimates of noise from a residual
     expected  label → expected log Bayes factor of that cause, by its size
     scanned   label → score of that cause by itself, scanned before any set is searched
     likely    numbers of a set of causes that is likely from the start, by label
@@ -44,9 +53,11 @@ class Search:
 
     def __init__(
         self, trial: Trial, point: Point, placebo: Mapping[str, float],
-        likely: Mapping[str, np.ndarray] | None = None,
+        likely: Mapping[str, np.ndarray] | None = None, noise: ResidualNoise | None = None,
+        parts: Parts = ALL,
     ) -> None:  # fmt: skip
-        self.table = Hypotheses(trial, point, placebo)
+        self.table = Hypotheses(trial, point, placebo if parts.placebo else {}, parts=parts)
+        self.noise = noise or ResidualNoise(trial, at_one_place=parts.placebo)
         self.likely = dict(likely or {})
         self.expected: dict[str, ExpectedEvidence] = {}
         self.scanned: dict[str, float] = {}
@@ -57,10 +68,10 @@ class Search:
     def run(self) -> None:
         """Evaluate hypotheses until no further one is promising."""
         if () not in self._tried:
-            self._weigh((), {}, self.table.first)
+            self.weigh((), {}, self.table.first)
             self._scan_each_alone()
             if self.likely:
-                self._weigh(tuple(sorted(self.likely)), self.likely, self.table.first)
+                self.weigh(tuple(sorted(self.likely)), self.likely, self.table.first)
         while len(self._tried) < self._most:
             ranked = self.table.ranked()
             least = ranked[0].score - SEARCH_NATS
@@ -71,9 +82,9 @@ class Search:
             if not fresh:
                 break
             self._expand(fresh[0])
-        self.table.rescore()
+        self.table.found = rescored(self.table.found, self.table.scale)
 
-    def without(self, *names: str) -> None:
+    def exclude(self, *names: str) -> None:
         """Go on without a cause, or without these together, for as many sets again: those behind
         were hardly weighed."""
         self.table.banned.add(frozenset(names))
@@ -93,18 +104,44 @@ class Search:
     def _banned(self, labels: Sequence[str]) -> bool:
         return holds_one(self.table.banned, labels)
 
-    def _weigh(self, labels: tuple[str, ...], numbers: Mapping[str, np.ndarray], at: Point) -> None:
+    def cause_set(self, labels: tuple[str, ...]) -> CauseSet:
+        """A set of causes, with what was weighed so far as seeds."""
+        table, nothing = self.table, self.table.found.get(((), NOMINAL))
+        return CauseSet(
+            table.trial, labels, self.noise, table.scale,
+            nothing=None if nothing is None else nothing.evidence,
+            raised=table.found.best(RAISED, table.banned),
+            intermittent=table.found.best(INTERMITTENT, table.banned),
+            spectrum=table.parts.spectrum,
+        )  # fmt: skip
+
+    def weigh(self, labels: tuple[str, ...], numbers: Mapping[str, np.ndarray], at: Point) -> None:
+        """Put the hypotheses of these causes into the table."""
+        table = self.table
         self._tried.add(labels)
-        weigh(self.table, labels, numbers, at)
+        weighed = weigh(self.cause_set(labels), table.fixed | dict(numbers), at)
+        if not weighed:
+            return
+        for one in weighed:
+            table.found.put(one)
+        if len(labels) == 1:
+            (label,) = labels
+            gained = table.found[labels, NOMINAL].evidence - table.nothing.evidence
+            table.alone[label] = max(gained, table.alone.get(label, -math.inf))
+        table.found = shortened(table.found, [table.nothing, *table.ranked()])
 
     def _weigh_again(self, labels: tuple[str, ...], one: Hypothesis, fit: Fit) -> None:
         """A set with one cause less than the best hypothesis, with that one's noise: it may have
         been weighed with noise that was less probable, which is no evidence for the cause."""
-        if one is self.table.ranked()[0] and weigh_as(self.table, labels, one, fit):
-            self._expanded.discard((labels, one.kind))
+        if one is not self.table.ranked()[0]:
+            return
+        key = (labels, one.kind)
+        if again := weigh_as(self.cause_set(labels), one, fit, self.table.found.get(key)):
+            self.table.found.put(again)
+            self._expanded.discard(key)
 
     def _expand(self, one: Hypothesis) -> None:
-        """The sets with one cause more or less than a hypothesis has."""
+        """Weigh the sets with one cause more or less than a hypothesis has."""
         self._expanded.add((one.causes, one.kind))
         fit = self.table.fit(one)
         best = self.table.ranked()[0].score
@@ -112,50 +149,32 @@ class Search:
             first = not one.causes and one.score > best - SEARCH_NATS
             worth = first or predicted > best - SEARCH_NATS
             if worth and labels not in self._tried and len(self._tried) < self._most:
-                self._weigh(labels, numbers, fit.point)
-        for label in one.causes if len(one.causes) > 1 else ():
-            labels = tuple(n for n in one.causes if n != label)
+                self.weigh(labels, numbers, fit.point)
+        for labels, numbers in reductions(one):
             if labels in self._tried:
                 self._weigh_again(labels, one, fit)
             elif len(self._tried) < self._most:
-                self._weigh(labels, {n: one.found.numbers[n] for n in labels}, fit.point)
+                self.weigh(labels, numbers, fit.point)
 
-    def _additions(
-        self, one: Hypothesis, fit: Fit
-    ) -> list[tuple[tuple[str, ...], dict[str, np.ndarray], float]]:
-        """The sets with one cause more that are worth a look: labels, numbers, score expected."""
+    def _additions(self, one: Hypothesis, fit: Fit) -> list[Addition]:
+        """As `additions`, of causes that are not banned; none beyond `MOST_CAUSES`."""
         if len(one.causes) >= MOST_CAUSES:
             return []
-        table = self.table
-        candidates = [
-            c for c in table.catalogue
-            if c.label not in one.causes and not self._banned((*one.causes, c.label))
-            and all(_compatible(c, table.by[label]) for label in one.causes)
-        ]  # fmt: skip
-        _, found = evidence.scan(
-            table.trial, fit.point, candidates, table.included(one.causes),
-            one.found.noise_factor, one.remainder,
-        )  # fmt: skip
-        additions = []
-        for f in found:
-            if f.evidence <= 0.0 or f.evidence < LIKELY * found[0].evidence:
-                continue
-            labels = tuple(sorted((*one.causes, f.name)))
-            numbers = {**one.found.numbers, **f.numbers}
-            score = table.score(one.evidence + f.evidence, labels, one.kind)
-            additions.append((labels, numbers, score))
-        return additions[:CONTENDERS]
+        catalogue = self.table.catalogue
+        allowed = [c for c in catalogue if not self._banned((*one.causes, c.label))]
+        return additions(self.table, one, fit, allowed)
 
     def _scan_each_alone(self) -> None:
         """What each cause explains by itself, and what would show of it, whatever is searched."""
         table, nothing = self.table, self.table.nothing
         _, found = evidence.scan(
-            table.trial, table.fit(nothing).point, table.catalogue, table.included(()),
+            table.trial, table.fit(nothing).point, table.catalogue, table.trial.fixed,
             nothing.found.noise_factor,
         )  # fmt: skip
+        scale = table.scale
         table.alone |= {f.name: f.evidence for f in found}
         self.scanned = {
-            f.name: table.score(nothing.evidence + f.evidence, (f.name,), NOMINAL) for f in found
+            f.name: scale.score(nothing.evidence + f.evidence, (f.name,), NOMINAL) for f in found
         }
         self.expected = {f.name: f.expected for f in found if f.expected is not None}
         self._say_what_would_not_show()
@@ -169,6 +188,36 @@ class Search:
         blind = [f"{name_of(n)} below {s:.0%}" for n, s in shares.items() if s > 1.0]
         if blind:
             log.info("not detectable at realistic size: %s", ", ".join(dict.fromkeys(blind)))
+
+
+def additions(
+    table: Hypotheses, one: Hypothesis, fit: Fit, causes: Sequence[Cause]
+) -> list[Addition]:
+    """The sets with one cause more than a hypothesis that are worth a look, by their log Bayes
+    factors where it is linearised (12): labels, numbers to start from, score expected."""
+    candidates = [
+        c for c in causes
+        if c.label not in one.causes
+        and all(_compatible(c, table.by[label]) for label in one.causes)
+    ]  # fmt: skip
+    _, found = evidence.scan(
+        table.trial, fit.point, candidates, (*table.trial.fixed, *one.causes),
+        one.found.noise_factor, one.remainder,
+    )  # fmt: skip
+    scale, added = table.scale, []
+    for f in found:
+        if f.evidence <= 0.0 or f.evidence < LIKELY * found[0].evidence:
+            continue
+        labels = tuple(sorted((*one.causes, f.name)))
+        numbers = {**one.found.numbers, **f.numbers}
+        added.append((labels, numbers, scale.score(one.evidence + f.evidence, labels, one.kind)))
+    return added[:CONTENDERS]
+
+
+def reductions(one: Hypothesis) -> list[tuple[tuple[str, ...], dict[str, np.ndarray]]]:
+    """The sets with one cause less than a hypothesis: labels, numbers to start from."""
+    fewer = (tuple(n for n in one.causes if n != label) for label in one.causes)
+    return [(labels, {n: one.found.numbers[n] for n in labels}) for labels in fewer if labels]
 
 
 def _compatible(one: Cause, other: Cause) -> bool:

@@ -1,4 +1,18 @@
-"""An unrecorded intermittent side force: its likelihood, its place and its course."""
+"""An unrecorded intermittent side force: its likelihood, its place and its course.
+
+A force of F newtons, rms, at the lever ℓ ahead of midship adds to the covariance of the
+acceleration at the nodes (equation (1) of `intermittent`):
+
+    Q_f = F² u uᵀ ⊗ C(T),   u = u_Y + ℓ u_N,   C_ij = exp(-|t_i - t_j| / T)
+
+    u_Y, u_N [3]  accelerations ν̇ that 1 N to starboard and 1 N m make of a ship at rest
+    T             correlation time: `lasts` times that of bursts
+    C [J, J]      over the times of the nodes; of a force that is on or off, within a run only
+
+ℓ, log F and log T are those of the largest log likelihood of the residual:
+
+    -½ c (rᵀ S⁻¹ r + log|S|),   S = R + Z (λ² Q_n + Q_f) Zᵀ
+"""
 
 from __future__ import annotations
 
@@ -61,7 +75,7 @@ class SideForce:
         """[3] lever, logarithms of force and correlation time."""
         return np.array([self.lever, math.log(self.force), math.log(self.lasts)])
 
-    def _at(self, coordinates: np.ndarray) -> SideForce:
+    def _moved(self, coordinates: np.ndarray) -> SideForce:
         """The same force there, within its reach and its longest and shortest time."""
         lever = float(np.clip(coordinates[0], -self.reach, self.reach))
         force, lasts = np.exp([coordinates[1], np.clip(coordinates[2], -LASTS, LASTS)]).tolist()
@@ -82,8 +96,9 @@ Step = tuple[SideForce, SideForce]
 
 def extrapolated(last: Step, this: Step) -> SideForce:
     """Limit of estimating force and numbers in turn, by the secant method on the lever (Aitken's Δ²
-    process). The numbers make up for a wrong place: the lever converges slowest. Force and
-    correlation time go as far on; MOST_STEPS limits how far, and the ship's ends the lever.
+    process): the limit is Δ₂ / (Δ₁ - Δ₂) steps beyond the last one, for steps Δ₁
+    and Δ₂ of the lever. The numbers make up for a wrong place: the lever converges slowest. Force
+    and correlation time go as far on; MOST_STEPS limits how far, and the ship's ends the lever.
 
     last, this  the force that the numbers were fitted with, and the estimate that followed
     """
@@ -96,7 +111,7 @@ def extrapolated(last: Step, this: Step) -> SideForce:
     else:
         further = min(now / (before - now), MOST_STEPS) if before != now else 0.0
     step = to_second._coordinates - to_first._coordinates
-    return to_second._at(to_second._coordinates + further * step)
+    return to_second._moved(to_second._coordinates + further * step)
 
 
 def estimate_side_force(
@@ -108,7 +123,7 @@ def estimate_side_force(
     raised, _ = by_channel(left, at_one_place)
     likelihood = _Likelihood(left, ref)
     sizes = left.nominal.acceleration[1] / abs(likelihood.across[1]) * SIZES  # N
-    lever, force = max(itertools.product(LEVERS, sizes), key=lambda tried: likelihood.of(*tried))
+    lever, force = max(itertools.product(LEVERS, sizes), key=lambda tried: likelihood.log(*tried))
     return likelihood.most_probable(np.array([lever, math.log(force), 0.0]), raised)
 
 
@@ -118,7 +133,7 @@ def estimate_on_off_force(
     """The most probable force of a device with this course, from one that may act at any time.
 
     stationary  that one
-    rows        [S, J] of the record at the knots of the segments that are `left`
+    rows        [S, J] of the record at the nodes of the segments that are `left`
     """
     runs = on_off.runs(course.on, rows)
     likelihood = _Likelihood(replace(left, nominal=replace(left.nominal, runs=runs)), ref)
@@ -140,7 +155,7 @@ class _Likelihood:
             ref.model.stand_in, ref.coefficients, np.eye(3)[1:]
         )
 
-    def of(self, lever: float, force: float, lasts: float = 1.0) -> float:
+    def log(self, lever: float, force: float, lasts: float = 1.0) -> float:
         """Log likelihood, nats."""
         unit, nominal = self.across + lever * self.length * self._turning, self._left.nominal
         time = lasts * nominal.intermittent_time
@@ -156,7 +171,7 @@ class _Likelihood:
         raised   log likelihood of raised noise, nats
         """
         finer = minimize(
-            lambda at: -self.of(at[0], *np.exp(at[1:])), first, method="Nelder-Mead",
+            lambda at: -self.log(at[0], *np.exp(at[1:])), first, method="Nelder-Mead",
             bounds=((-REACH_LENGTHS, REACH_LENGTHS), (None, None), (-LASTS, LASTS)),
             options={"initial_simplex": first + STEPS * np.eye(4, 3), "xatol": 0.005,
                      "fatol": 0.1},

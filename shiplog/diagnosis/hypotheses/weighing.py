@@ -1,21 +1,31 @@
-"""One set of causes under every kind of remainder, linearised where it is most probable."""
+"""One set of causes under every kind of remainder, linearised where it is most probable.
+
+Under each kind the score (15) is the largest over λ and over what the kind leaves free:
+
+    nominal        log Z(λ) + log p(λ), λ about 1
+    raised         the same with a wide prior of λ; or with a factor in each channel of its own
+    intermittent   log Z(λ, force) instead of raised noise
+    family         log Z + log Bayes factor of a change of its weights w ~ N(0, σ² I) (12)
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from shiplog.diagnosis import thresholds
-from shiplog.diagnosis.hypotheses import evidence, fits, unrecorded_thruster
+from shiplog.diagnosis.hypotheses import evidence, unrecorded_thruster
+from shiplog.diagnosis.hypotheses.evaluate import resume
 from shiplog.diagnosis.hypotheses.hypothesis import Hypothesis
-from shiplog.diagnosis.hypotheses.relinearisation import converge
-from shiplog.diagnosis.hypotheses.table import Hypotheses
+from shiplog.diagnosis.hypotheses.intermittent import ResidualNoise
+from shiplog.diagnosis.hypotheses.table import Scale
 from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
-from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder, noise_prior
-from shiplog.diagnosis.trial.fitted import Fit, Found, Level, Point
+from shiplog.diagnosis.noise.remainder import NOMINAL, RAISED, Remainder, noise_prior
+from shiplog.diagnosis.trial.fitted import Fit, Found, Level, Point, Start
 from shiplog.diagnosis.trial.trial import Trial
 
 SEARCH_NATS = 10.0  # nats behind the best, beyond which a hypothesis is not worth a linearisation
@@ -31,16 +41,59 @@ LEFT_NATS = 300.0  # behind raised noise, that further rounds do not make up for
 
 
 @dataclass(frozen=True)
+class CauseSet:
+    """A set of causes to be weighed, and what the sets before it are a seed of.
+
+    labels        of its causes
+    noise         estimates of noise from a residual
+    scale         of the scores
+    nothing       log evidence of no cause; None where it is that set
+    raised        the most probable hypothesis so far with raised process noise
+    intermittent  the same with an intermittent force
+    spectrum      whether a change of a family has to explain some of raised noise
+    """
+
+    trial: Trial
+    labels: tuple[str, ...]
+    noise: ResidualNoise
+    scale: Scale
+    nothing: float | None = None
+    raised: Hypothesis | None = None
+    intermittent: Hypothesis | None = None
+    spectrum: bool = True
+
+    @property
+    def included(self) -> tuple[str, ...]:
+        """Labels that a fit includes; causes of the model itself keep their numbers."""
+        return (*self.trial.fixed, *self.labels)
+
+    def fit(self, fit: Fit, remainder: Remainder, anew: bool = False) -> Fit:
+        """These causes with another remainder, from the numbers and path of a fit."""
+        start = Start(fit.found.numbers, fit.point.path)
+        return resume(self.trial, self.included, remainder, start, anew=anew)
+
+    def hypothesis(self, fit: Fit, force: SideForce | None = None) -> Hypothesis:
+        """A fit of them with its score."""
+        return self.scale.hypothesis(self.labels, fit.found.evidence, fit, force)
+
+
+@dataclass(frozen=True)
 class Rough:
     """A set of causes with raised process noise: where it is linearised, and its levels there."""
 
+    of: CauseSet
     point: Point
     remainder: Remainder
     levels: list[Level]
 
-    @property
+    @cached_property
     def best(self) -> Level:
         return max(self.levels, key=lambda level: level.value)
+
+    @property
+    def raises(self) -> bool:
+        """Whether the process noise is raised by enough to ask what raised it."""
+        return self.best.noise_factor > RAISED_FROM
 
     @property
     def observations(self) -> float:
@@ -58,16 +111,17 @@ class Rough:
         return max(-float(parabola[0]), 0.0)
 
     def spectrum(self) -> float:
-        """Nats that a family gains where it explains the share `SPECTRUM` of the raised noise."""
+        """Nats that a family gains where it explains the share `SPECTRUM` of the raised noise:
+        -½ n log(1 - SPECTRUM (1 - λ⁻²)) of n observations."""
         factor = self.remainder.overall(self.best.noise_factor)
         share = thresholds.SPECTRUM * max(1.0 - factor**-2.0, 0.0)
         return -0.5 * self.observations * math.log1p(-share)
 
-    def fit(self, trial: Trial, labels: Sequence[str], included: Sequence[str], one: Level) -> Fit:
-        """The set at one of its levels."""
-        numbers = evidence.numbers_of(trial, one, self.point, included)
-        found = Found("+".join(labels), one.value, one.noise_factor, *numbers)
-        return Fit(self.point, found, self.remainder)
+    def fit(self, level: Level, remainder: Remainder | None = None) -> Fit:
+        """The set at one of its levels, under this remainder or another one of the same noise."""
+        numbers = evidence.numbers_of(self.of.trial, level, self.point, self.of.included)
+        found = Found("+".join(self.of.labels), level.value, level.noise_factor, *numbers)
+        return Fit(self.point, found, remainder or self.remainder)
 
 
 @dataclass(frozen=True)
@@ -81,92 +135,85 @@ class Change:
     noise: float
 
 
-def weigh(
-    table: Hypotheses, labels: tuple[str, ...], numbers: Mapping[str, np.ndarray], at: Point
-) -> None:
-    """Put the hypotheses of these causes into the table; none, where their fit diverges.
+def weigh(of: CauseSet, numbers: Mapping[str, np.ndarray], at: Point) -> list[Hypothesis]:
+    """The hypotheses of these causes, one a kind of remainder; none, where their fit diverges.
 
-    numbers   of the causes, to start from; at: a point whose path is to start from
+    numbers   of the causes, with those of the model's own, to start from
+    at        a point whose path is to start from; of no cause the point itself
     """
-    trial, included = table.trial, table.included(labels)
-    point, near = at, None
-    if labels:
-        lowest = table.nothing.evidence - FAILED_NATS
-        both = table.fixed | dict(numbers)
-        point, base = converge(trial, included, both, at.path, lowest, RAISING)
-        if not math.isfinite(base.evidence):
-            return
-        near = base.noise_factor
+    plain = _plain(of, numbers, at)
+    if plain is None:
+        return []
+    nominal = of.hypothesis(plain.fit(best(of.trial, plain.levels, NOMINAL), Remainder()))
+    rough = shape(plain)
+    raised = of.hypothesis(rough.fit(rough.best))
+    weighed = [nominal, raised]
+    if plain.raises:
+        force = _with_force(of, raised)
+        weighed += [force] if force is not None else []
+    alone = max(weighed, key=lambda h: h.score)
+    return [*weighed, *_with_families(of, plain, rough, alone)]
+
+
+def _plain(of: CauseSet, numbers: Mapping[str, np.ndarray], at: Point) -> Rough | None:
+    """The set under one factor λ of all channels, with levels about the most probable λ under
+    `raised` and under `nominal`; None where its fit diverges."""
+    trial, included, point, near = of.trial, of.included, at, None
+    if of.labels:
+        assert of.nothing is not None
+        start = Start(numbers, at.path)
+        fit = resume(trial, included, RAISING, start, of.nothing - FAILED_NATS)
+        if fit.diverged:
+            return None
+        point, near = fit.point, fit.found.noise_factor
     levels = evidence.levels(trial, point, included, near, RAISING)
     if near is not None and near > RAISED_FROM:  # the noise may be nominal again
         levels.append(evidence.level(trial, point, 1.0, included, RAISING))
     nominal = best(trial, levels, NOMINAL).noise_factor
     if abs(math.log(nominal)) > 2.0 * trial.nominal_spread:  # its prior favours the nominal noise
         levels += nominal_levels(trial, point, included, nominal)
-    plain = Rough(point, RAISING, levels)
-    nominal_fit = plain.fit(trial, labels, included, best(trial, levels, NOMINAL))
-    table.put(labels, nominal_fit.found.evidence, replace(nominal_fit, remainder=Remainder()))
-    rough = rougher(table, labels, plain)
-    raised_fit = rough.fit(trial, labels, included, rough.best)
-    table.put(labels, raised_fit.found.evidence, raised_fit)
-    if len(labels) == 1:
-        gained = table.found[labels, NOMINAL].evidence - table.nothing.evidence
-        table.noted_alone(labels[0], gained)
-    if plain.best.noise_factor > RAISED_FROM:
-        _weigh_intermittent(table, labels)
-    _weigh_families(table, labels, plain, rough)
-    table.forget()
+    return Rough(of, point, RAISING, levels)
 
 
-def weigh_as(table: Hypotheses, labels: tuple[str, ...], one: Hypothesis, fit: Fit) -> bool:
-    """Whether these causes, some of another hypothesis, are more probable with the noise of that
-    one, where it has a shape of its own. They are then kept with it."""
+def weigh_as(
+    of: CauseSet, one: Hypothesis, fit: Fit, before: Hypothesis | None
+) -> Hypothesis | None:
+    """These causes, some of another hypothesis, with the noise of that one, where it has a shape of
+    its own; None where they are not more probable with it than `before`."""
     if not one.remainder.shaped:
-        return False
-    numbers = {name: fit.found.numbers[name] for name in table.included(labels)}
+        return None
+    numbers = {name: fit.found.numbers[name] for name in of.included}
     start = replace(fit, found=replace(fit.found, numbers=numbers))
-    table.trial.converged.pop((table.included(labels), one.remainder), None)  # begin there
-    again = _fitted_with(table, labels, start, one.remainder)
-    before = table.found.get((labels, one.kind))
+    again = of.fit(start, one.remainder, anew=True)
     least = -math.inf if before is None else before.evidence + evidence.LITTLE_NATS
     if again.diverged or again.found.evidence < least:
-        return False
+        return None
     force = one.side_force
-    pattern = None if force is None else table.with_pattern(again, force)
-    table.put(labels, again.found.evidence, again, pattern)
-    return True
+    return of.hypothesis(again, None if force is None else of.noise.add_pattern(again, force))
 
 
-def rougher(table: Hypotheses, labels: tuple[str, ...], plain: Rough) -> Rough:
+def shape(plain: Rough) -> Rough:
     """Raised noise with a factor of its own in each channel, where that is more probable than one
     for all. Factors and numbers are fitted in turn: each is off where the other one is. They start
     from the factors that were most probable so far, and stay there where the set is far behind."""
-    if plain.best.noise_factor <= RAISED_FROM:
+    if not plain.raises:
         return plain
-    trial, included = table.trial, table.included(labels)
-    fit = plain.fit(trial, labels, included, plain.best)
-    before, rounds = table.best_of(RAISED), NOISE_ROUNDS
+    of, fit = plain.of, plain.fit(plain.best)
+    before, rounds = of.raised, NOISE_ROUNDS
     if before is not None and before.remainder.shaped:
-        fit = _fitted_with(table, labels, fit, before.remainder)
-        near = table.score(fit.found.evidence, labels, RAISED) > before.score - SEARCH_NATS
-        rounds = 1 if near else 0
+        fit = of.fit(fit, before.remainder)
+        score = of.scale.score(fit.found.evidence, of.labels, RAISED)
+        rounds = 1 if score > before.score - SEARCH_NATS else 0
     for _ in range(rounds):
         if not fit.diverged:
-            fit = _fitted_with(table, labels, fit, table.raised_by_channel(fit))
+            fit = of.fit(fit, of.noise.raised(fit))
     if fit.diverged:
         return plain
-    at, remainder = fit.point, fit.remainder
-    levels = evidence.levels(trial, at, included, fit.found.noise_factor, remainder)
-    shaped = Rough(at, remainder, levels)
+    levels = evidence.levels(
+        of.trial, fit.point, of.included, fit.found.noise_factor, fit.remainder
+    )  # fmt: skip
+    shaped = Rough(of, fit.point, fit.remainder, levels)
     return shaped if shaped.best.value > plain.best.value else plain
-
-
-def _fitted_with(table: Hypotheses, labels: tuple[str, ...], fit: Fit, remainder: Remainder) -> Fit:
-    """The same causes with another remainder."""
-    point, found = converge(
-        table.trial, table.included(labels), fit.found.numbers, fit.point.path, remainder=remainder
-    )
-    return Fit(point, found, remainder)
 
 
 def nominal_levels(
@@ -191,17 +238,15 @@ def best(trial: Trial, levels: Sequence[Level], kind: str) -> Level:
 
 
 def raised_over_nominal(trial: Trial, noise: float) -> float:
-    """Log prior density of a level of noise under `raised` over that under `nominal`."""
+    """log p(λ | raised) - log p(λ | nominal)."""
     nominal = trial.nominal_spread
     return noise_prior(noise, nominal, RAISING) - noise_prior(noise, nominal, Remainder())
 
 
-# --- families of the discrepancy, and an intermittent force
+# --- families of the discrepancy
 
 
-def changed(
-    trial: Trial, plain: Rough, rough: Rough, included: tuple[str, ...], family: str
-) -> Change:
+def change(plain: Rough, rough: Rough, family: str) -> Change:
     """A change of one family's weights together with included causes, at its best size and noise.
 
     The noise may be raised as well, since no family describes an unknown force exactly: in the
@@ -209,20 +254,23 @@ def changed(
     than noise alone that is raised by one factor; otherwise its functions are a fit to noise. Nor
     does it count where it explains little of raised noise: that is an error of the spectrum.
     """
+    trial, included = plain.of.trial, plain.of.included
 
     def tried(of: Rough) -> list[tuple[float, float, float]]:
         """Log evidence, size of the change, λ at each level, which are made under `raised`."""
         found = []
         for level in of.levels:
-            gained, size = fits.changed(trial, of.point, level, included, family, of.remainder)
+            gained, size = evidence.family_change(
+                trial, of.point, level, included, family, of.remainder
+            )
             found.append((level.value + gained, size, level.noise_factor))
         return found
 
     nominal = [(v - raised_over_nominal(trial, noise), s, noise) for v, s, noise in tried(plain)]
     noisy = max(nominal)[0] > plain.best.value
     value, size, noise = max(tried(rough) if noisy else nominal)
-    raised = plain.best.noise_factor > RAISED_FROM
-    if raised and value - rough.best.value < rough.spectrum():
+    least = rough.spectrum() if plain.of.spectrum else 0.0
+    if plain.raises and value - rough.best.value < least:
         value = -math.inf
     if not noisy:
         return Change(plain.point, Remainder(family, size), value, noise)
@@ -230,78 +278,74 @@ def changed(
     return Change(rough.point, remainder, value, noise)
 
 
-def _weigh_families(table: Hypotheses, labels: tuple[str, ...], plain: Rough, rough: Rough) -> None:
-    trial, included = table.trial, table.included(labels)
-    kinds = (NOMINAL, RAISED, INTERMITTENT)
-    found = (table.found[labels, kind] for kind in kinds if (labels, kind) in table.found)
-    alone = max(found, key=lambda h: h.score)
-    changes = [changed(trial, plain, rough, included, family) for family in trial.families]
-    scores = [table.score(c.value, labels, c.remainder.kind) for c in changes]
+def _with_families(
+    of: CauseSet, plain: Rough, rough: Rough, alone: Hypothesis
+) -> Iterator[Hypothesis]:  # fmt: skip
+    """The set together with a change of each family; `alone` is its best hypothesis without."""
+    changes = [change(plain, rough, family) for family in of.trial.families]
+    scores = [of.scale.score(c.value, of.labels, c.remainder.kind) for c in changes]
     near = max((alone.score, *(score - SEARCH_NATS for score in scores)))
     for one, score in zip(changes, scores, strict=True):
-        _weigh_change(table, labels, one, alone, score >= near)
+        yield _with_change(of, one, alone, score >= near)
 
 
-def _weigh_change(
-    table: Hypotheses, labels: tuple[str, ...], one: Change, alone: Hypothesis, leads: bool
-) -> None:
+def _with_change(of: CauseSet, one: Change, alone: Hypothesis, leads: bool) -> Hypothesis:
     """The set together with a change of one family; linearised again if that is promising."""
-    trial, included, remainder = table.trial, table.included(labels), one.remainder
     if not leads:  # far behind: its numbers are never asked for
         found = replace(alone.found, evidence=one.value)
-        table.put(labels, one.value, Fit(one.point, found, remainder))
-        return
-    here, _ = evidence.scan(trial, one.point, (), included, one.noise, remainder)
-    if labels:
-        again, base = converge(trial, included, here.numbers, one.point.path, remainder=remainder)
-        if math.isfinite(base.evidence) and base.evidence > one.value:
-            table.put(labels, base.evidence, Fit(again, base, remainder))
-            return
-    table.put(labels, max(one.value, here.evidence), Fit(one.point, here, remainder))
+        return of.hypothesis(Fit(one.point, found, one.remainder))
+    here, _ = evidence.scan(of.trial, one.point, (), of.included, one.noise, one.remainder)
+    there = Fit(one.point, here, one.remainder)
+    if of.labels:
+        again = of.fit(there, one.remainder)
+        if not again.diverged and again.found.evidence > one.value:
+            return of.hypothesis(again)
+    return of.scale.hypothesis(of.labels, max(one.value, here.evidence), there)
 
 
-def _weigh_intermittent(table: Hypotheses, labels: tuple[str, ...]) -> None:
+# --- an intermittent force
+
+
+def _with_force(of: CauseSet, raised: Hypothesis) -> Hypothesis | None:
     """An intermittent side force instead of raised process noise, with the causes fitted together
     with it: fitted to raised noise alone they would make up for it. Less probable than noise that
     is raised in each channel by itself it is that noise, and is not counted twice. Nor is a set
     asked that is far behind another one with raised noise."""
-    raised, most = table.found[labels, RAISED], table.best_of(RAISED)
-    assert most is not None
-    if raised.score < most.score - SEARCH_NATS:
-        return
-    found = _fitted_with_force(table, labels, raised)
+    if of.raised is not None and raised.score < of.raised.score - SEARCH_NATS:
+        return None
+    found = _fitted_with_force(of, raised)
     if found is None:
-        return
+        return None
     fit, force = found
-    if force.gain > 0.0 and fit.found.evidence > raised.evidence:
-        table.put(labels, fit.found.evidence, fit, table.with_pattern(fit, force))
+    if force.gain <= 0.0 or fit.found.evidence <= raised.evidence:
+        return None
+    return of.hypothesis(fit, of.noise.add_pattern(fit, force))
 
 
-def _fitted_with_force(
-    table: Hypotheses, labels: tuple[str, ...], raised: Hypothesis
-) -> tuple[Fit, SideForce] | None:
+def _fitted_with_force(of: CauseSet, raised: Hypothesis) -> tuple[Fit, SideForce] | None:
     """An intermittent force and the numbers of a set, fitted in turn until the evidence stays. They
     begin with the most probable force so far, or with raised noise. Its gain is that of the last
     estimate next to these numbers. None where the fit diverges."""
-    fit, before = table.fit(raised), table.best_of(INTERMITTENT)
-    given = None if before is None else before.side_force
+    assert isinstance(raised.point, Point)
+    fit = Fit(raised.point, raised.found, raised.remainder)
+    given = None if of.intermittent is None else of.intermittent.side_force
     best: tuple[Fit, SideForce] | None = None
     if given is not None:
-        fit = _fitted_with(table, labels, fit, given.remainder)
+        fit = of.fit(fit, given.remainder)
         best = None if fit.diverged else (fit, given)
     steps: list[unrecorded_thruster.Step] = []
     gain = 0.0
     for _ in range(FORCE_ROUNDS):
         if fit.diverged:  # nor is there anything left of it that a force could explain
             break
-        tried = table.intermittent(fit)
+        tried = of.noise.side_force(fit)
         gain = tried.gain
         steps = [] if given is None else [*steps[-1:], (given, tried)]
         given = tried if len(steps) < 2 else unrecorded_thruster.extrapolated(*steps)
-        last, fit = fit, _fitted_with(table, labels, fit, given.remainder)
+        last, fit = fit, of.fit(fit, given.remainder)
         if given is not tried and fit.found.evidence < last.found.evidence:  # they led too far
             given, steps = tried, []
-            fit = _fitted_with(table, labels, last, given.remainder)
+            fit = of.fit(last, given.remainder)
         reached = -math.inf if best is None else best[0].found.evidence
         if fit.diverged or fit.found.evidence <= reached:
             break

@@ -44,7 +44,7 @@ def find_external_forces(
     physics, values = ref.model.stand_in, np.array(list(ref.coefficients.values()))
     base, _ = evidence.scan(trial, point, (), trial.fixed, remainder=remainder)
     fit = Fit(point, base, remainder)
-    residual, d = fits.residual(trial, fits.of_parts(trial, whole, fit), fit)
+    residual, d = fits.residual(trial, fits.less_parts(trial, whole, fit), fit)
     process_noise = trial.process_noise(remainder, whole.cut).times(base.noise_factor)
     found: tuple[external_forces.Stretch, ...] = ()
     if external_forces.has_propulsion(physics):

@@ -63,6 +63,20 @@ class Point:
 
 
 @dataclass(frozen=True)
+class Start:
+    """Where a fit of causes begins.
+
+    numbers       label → numbers, SI
+    path          to start from, or a point whose linearisation predicts it; None without any
+    noise_factor  λ at which an earlier fit of them converged; None without any
+    """
+
+    numbers: Mapping[str, np.ndarray]
+    path: Path | Point | None
+    noise_factor: float | None = None
+
+
+@dataclass(frozen=True)
 class Fit:
     """A hypothesis with the trial linearised where it was found, and what remains with it."""
 
@@ -74,6 +88,11 @@ class Fit:
     def included(self) -> tuple[str, ...]:
         """Labels of the causes that it holds, those of the model with them."""
         return tuple(self.found.numbers)
+
+    @property
+    def start(self) -> Start:
+        """Where a further fit of the same hypothesis begins."""
+        return Start(self.found.numbers, self.point.path, self.found.noise_factor)
 
     @property
     def diverged(self) -> bool:
@@ -88,15 +107,22 @@ class Fit:
 
 @dataclass(frozen=True)
 class Level:
-    """One λ: the trial's products in units, robustly weighted, and the base hypothesis' solution.
+    """Posterior of a base hypothesis at one factor λ of the process noise.
 
-    The base hypothesis holds N numbers: all nominal ones, then those of the included causes, then
-    the weights of its remainder's family.
+    It holds N numbers, in units: all nominal ones, then those of the included causes, then the
+    weights of its remainder's family.
+
+    noise_factor  λ
+    G             [1 + N, 1 + N]  [r H]ᵀ R⁻¹ [r H], segments weighted
+    covariance    [N, N]  P - K S Kᵀ = A⁻¹
+    mean          [N]     μ + K v = A⁻¹ b
+    value         log evidence
+    share         of it, what the bounds of numbers add
     """
 
     noise_factor: float
-    gram: np.ndarray  # [1 + N, 1 + N] products of [e | J]
-    inverse: np.ndarray  # [N, N] of information and data together
-    solution: np.ndarray  # [N]
-    value: float  # log evidence of the base
-    share: float = 0.0  # of it, what the bounds of numbers add
+    G: np.ndarray
+    covariance: np.ndarray
+    mean: np.ndarray
+    value: float
+    share: float = 0.0

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shiplog.diagnosis.nominal import nominal_cache, nominal_campaign
+from shiplog.diagnosis.decision_parts import ALL, Parts
+from shiplog.diagnosis.nominal import nominal_cache, nominal_campaign, voyage_effects
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.diagnosis.trial.trial_voyages import model_of, setting_of
 from shiplog.models import causes as catalogue
@@ -27,7 +28,7 @@ class Setup:
 def trial_of(
     run: Run, nominal: Record | None, recorded: Record, own: Sequence[Cause],
     lacking: str = "", numbers: Mapping[str, np.ndarray] | None = None,
-    barred: Mapping[str, str] | None = None,
+    barred: Mapping[str, str] | None = None, parts: Parts = ALL,
 ) -> Setup:  # fmt: skip
     """For a network, the ship's MMG is tested, fitted to the network's training voyages.
 
@@ -36,6 +37,7 @@ def trial_of(
     lacking   why the model cannot identify causes that change forces; empty where it can
     numbers   of causes found in these voyages, where no nominal campaign shows the discrepancy
     barred    name → why a cause is not tested, in addition to what ship and model lack
+    parts     of the decision, that act: a part that does not is taken from what was learned
     """
     setting = setting_of(run, nominal if nominal is not None else recorded, recorded)
     extension = run.extension
@@ -66,5 +68,10 @@ def trial_of(
         start = nominal_campaign.widened(plain, before, start)
         at = nominal_cache.converged(plain, before, start, nominal)
         found = nominal_cache.characteristics(plain, before, start, nominal, at)
+        if not parts.voyage_effects:
+            least = dict.fromkeys(found.deviation, voyage_effects.LEAST_DEVIATION)
+            found = replace(found, deviation=least)
+        if not parts.share_of_trial:
+            found = replace(found, share=1.0)
         campaign = nominal_campaign.learn(model, setting, start, nominal, at, found)
     return Setup(Trial.of(campaign, recorded, tuple(held)), untested)

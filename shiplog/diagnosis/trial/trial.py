@@ -7,8 +7,8 @@ cause's numbers as a change from nominal, or a family of the discrepancy as a ch
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
@@ -25,48 +25,11 @@ from shiplog.diagnosis.noise.likelihood import ProcessNoise
 from shiplog.diagnosis.noise.remainder import LEAST_SPREAD, Remainder
 from shiplog.diagnosis.nominal.nominal_campaign import Campaign
 from shiplog.diagnosis.nominal.nominal_reference import Reference
+from shiplog.diagnosis.trial.cache import Cache, Numbers, Read
 from shiplog.diagnosis.trial.fitted import Point
 from shiplog.diagnosis.trial.trial_products import Products
 from shiplog.models.causes import Cause
 from shiplog.voyages.rows.recording import Record
-
-Read = tuple[segments.Cut, np.ndarray, np.ndarray]  # see `measurement_correction.read`
-Numbers = Mapping[str, np.ndarray]
-
-
-class Readings:
-    """A trial as read with the sensors' causes put right: as it is, and as it was last."""
-
-    def __init__(self) -> None:
-        self._known: list[tuple[Numbers, Read]] = []
-
-    def of(self, reference: Reference, record: Record, rows: np.ndarray, numbers: Numbers) -> Read:
-        """The segments as read with these numbers, and the effects of all of them on the inputs
-        and size of the discrepancy."""
-        cut, moved, observed = self._read(reference, record, rows, numbers)
-        return as_hypothesised(cut, reference.model.causes, numbers), moved, observed
-
-    def _read(
-        self, reference: Reference, record: Record, rows: np.ndarray, numbers: Numbers
-    ) -> Read:
-        """The segments as read with those of these numbers that change what is read.
-
-        The effect of a sensor's cause depends on the corrections before it. With a clock that is
-        one second late, the antenna's columns are one second late too, and two clocks would seem to
-        disagree. Columns at nearby numbers are no substitute. Those of several clocks differ by
-        noise, and a sum of them would fit the noise of the data.
-        """
-        reading = {
-            c.label: np.asarray(numbers[c.label])
-            for c in reference.model.causes
-            if c.reads and c.label in numbers
-        }
-        for before, found in self._known:
-            if before.keys() == reading.keys() and reference.apart(before, reading) == 0.0:
-                return found
-        found = read(reference.model, reference.setting, record, rows, dict(reading))
-        self._known = [*self._known[:1], (reading, found)]
-        return found
 
 
 @dataclass(frozen=True)
@@ -79,9 +42,7 @@ class Trial:
     weight    [S] for how much a segment counts; nothing, where the model diverges on it
     first     where it was linearised first; None before that
     begun     whether it is known where the model itself diverges
-    products  of the points at which it was linearised
-    readings  of the record
-    converged  causes and remainder → numbers, path and λ at which a fit of them converged
+    cache     readings, products and starts, which its copies with other weights share
     """
 
     campaign: Campaign
@@ -93,18 +54,16 @@ class Trial:
     voyage: np.ndarray
     unseen: Discrepancy
     weight: np.ndarray
-    products: Products
+    cache: Cache
     first: Point | None = None
     begun: bool = False
-    readings: Readings = field(default_factory=Readings)
-    converged: dict[tuple[tuple[str, ...], Remainder], tuple[Numbers, Path, float]] = field(
-        default_factory=dict
-    )
 
     @classmethod
     def of(
-        cls, campaign: Campaign, record: Record, fixed: Sequence[str] = (), **more: object
-    ) -> Self:
+        cls, campaign: Campaign, record: Record, fixed: Sequence[str] = (),
+        cache: Cache | None = None, **more: object,
+    ) -> Self:  # fmt: skip
+        """All segments of a record with weight 1; `cache` is a new one where none is handed in."""
         grid, rows = segments.grid(record), segments.begins(record)
         reference = campaign.reference
         knots = segment_nodes.at_knots(segments.cut(record, rows), grid)
@@ -116,14 +75,20 @@ class Trial:
         longest = max((len(part) for part in campaign.rows), default=PART)
         parts = tuple(parts_of(record.voyage[rows], longest, fewest=1))
         voyage = record.voyage[rows[[part[0] for part in parts]]]
-        products = Products(campaign, unseen, grid, parts, voyage)
         weight = np.ones(len(rows))
         return cls(campaign, record, tuple(fixed), grid, rows, parts, voyage, unseen, weight,
-                   products, **more)  # type: ignore[arg-type]  # fmt: skip
+                   cache or Cache(), **more)  # type: ignore[arg-type]  # fmt: skip
 
     @property
     def reference(self) -> Reference:
         return self.campaign.reference
+
+    @property
+    def products(self) -> Products:
+        """Products of its segments, at any point of it."""
+        return Products(
+            self.campaign, self.unseen, self.grid, self.parts, self.voyage, self.cache
+        )  # fmt: skip
 
     @cached_property
     def families(self) -> dict[str, np.ndarray]:
@@ -171,7 +136,7 @@ class Trial:
         noise_factor: float | None = None,
         remainder: Remainder | None = None,
     ) -> Point:
-        """The trial linearised with these numbers, about a path fitted to the measurement.
+        """The trial linearised with these numbers (1), about a path fitted to the measurement.
 
         near          a path to start from, or a point whose linearisation predicts the path
         noise_factor  λ that limits the path. A path that follows every wave of the noise is as far
@@ -185,7 +150,7 @@ class Trial:
         wide = ref.wide
         if noise_factor is not None:
             wide = ref.held(noise_factor, remainder or Remainder())
-        cut, moved, observed = self.readings.of(ref, self.record, self.rows, numbers)
+        cut, moved, observed = self._reading(numbers)
         whole = np.concatenate((ref.theta, ref.columns.numbers(dict(numbers))))
         about = ref.about(cut, self.grid)
         if isinstance(near, Point):
@@ -200,6 +165,30 @@ class Trial:
         return self._judged(
             Point(numbers, path, linear, likelihood.weighed(linear, ref.process_noise))
         )
+
+    def _reading(self, numbers: Numbers) -> Read:
+        """The segments as read with these numbers, and the effects of all of them on the inputs
+        and size of the discrepancy.
+
+        The effect of a sensor's cause depends on the corrections before it. With a clock that is
+        one second late, the antenna's columns are one second late too, and two clocks would seem to
+        disagree. Columns at nearby numbers are no substitute. Those of several clocks differ by
+        noise, and a sum of them would fit the noise of the data.
+        """
+        ref, causes = self.reference, self.reference.model.causes
+        reading = {
+            c.label: np.asarray(numbers[c.label]) for c in causes if c.reads and c.label in numbers
+        }
+        alike = (
+            kept for before, kept in self.cache.readings
+            if before.keys() == reading.keys() and ref.apart(before, reading) == 0.0
+        )  # fmt: skip
+        kept = next(alike, None)
+        if kept is None:
+            kept = read(ref.model, ref.setting, self.record, self.rows, dict(reading))
+            self.cache.readings = [*self.cache.readings[:1], (reading, kept)]
+        cut, moved, observed = kept
+        return as_hypothesised(cut, causes, numbers), moved, observed
 
     def _judged(self, point: Point) -> Point:
         if self.begun and (point.linear.lost & (self.weight > 0.0)).any():
@@ -224,9 +213,9 @@ class Trial:
         )
         return point.linear.joined(between)
 
-    def left(self, linear: Linear, d: np.ndarray) -> tuple[Linear, np.ndarray]:
-        """A pass of the trial without what the misfit's weights among the numbers d [C] do, and
-        the numbers of its own columns."""
+    def less_misfit(self, linear: Linear, d: np.ndarray) -> tuple[Linear, np.ndarray]:
+        """A pass of the trial without W w, the effect of the misfit's weights w among the numbers
+        d [C], and the numbers of its own columns."""
         misfit, count = self.reference.misfit, self.reference.columns.linearised
         if misfit is not None:
             linear = linear.less(misfit.accelerations(linear.cut, self.grid) @ d[count:])

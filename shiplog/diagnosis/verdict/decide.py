@@ -63,12 +63,13 @@ def decide(
     stated_kind = found.remainder
     best = posteriors.best_with(found, names, stated_kind if not names else None)
     fit = table.fit(best)
-    p_device, kind = posteriors.device(best), posteriors.practical_kind(table, best)
+    p_device = posteriors.device(best, table.parts.pattern)
+    kind = posteriors.practical_kind(table, best)
     is_device = p_device >= thresholds.STATED  # then what remains has a name, too
     in_doubt = _imitated(table, best, fit, names)
     sure = tuple(name for name in names if name not in in_doubt)
     kept = [n for n in best.causes if name_of(n) not in in_doubt]
-    explain_most = is_device or posteriors.share_of_causes(table, best, kept) >= thresholds.MOST
+    explain_most = is_device or posteriors.share_of_causes(table, best, kept) >= _most(table)
     verdict, structure, named, side_force = "undecided", None, (), None
     either: tuple[str, ...] = ()
     why = ""
@@ -107,6 +108,11 @@ def decide(
     ), found  # fmt: skip
 
 
+def _most(table: Hypotheses) -> float:
+    """Share of what a hypothesis explains, that its causes have to explain."""
+    return thresholds.MOST if table.parts.share_of_causes else 0.0
+
+
 def _imitated(
     table: Hypotheses, best: Hypothesis, fit: Fit, names: Sequence[str]
 ) -> dict[str, str]:
@@ -119,7 +125,7 @@ def _imitated(
         name = name_of(label)
         if label in table.trial.fixed or name not in names:
             continue
-        if not posteriors.slight(table, best, name):
+        if table.parts.imitation and not posteriors.slight(table, best, name):
             size = _size_without(table, fit.remainder, name)
             share = fits.imitated(table.trial, fit, label, size)
             shares[name] = max(share, shares.get(name, 0.0))
@@ -152,7 +158,8 @@ def _named(
             continue
         assert best.found.covariance is not None
         numbers = np.asarray(best.found.numbers[label])
-        fx = form_error_of(by[label]) * numbers  # its equations are no better than that
+        share = form_error_of(by[label]) if table.parts.form_error else 0.0
+        fx = share * numbers  # its equations are no better than that
         ux = by[label].unit_error * numbers  # one error of all numbers of the cause
         given.append(
             Named(

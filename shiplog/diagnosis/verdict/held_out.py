@@ -246,9 +246,9 @@ class HeldOut(Rollouts):
             out &= (recorded.time[segment.rows] >= middle) == late
         numbers, coefficients = {}, None
         if decision.fit.included or decision.adapted:
-            numbers, fitted = fits.without(self.trial, decision.fit, out)
+            numbers, fitted = fits.refitted(self.trial, decision.fit, out)
             if self.own is not None and decision.adapted:
                 trial, simulated = self.own.extended_by(decision)
-                _, fitted = fits.without(trial, simulated.fit, out)
+                _, fitted = fits.refitted(trial, simulated.fit, out)
             coefficients = fitted if decision.adapted else None
         return {n.cause.label: numbers[n.cause.label] for n in decision.named}, coefficients

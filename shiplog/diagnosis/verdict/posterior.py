@@ -161,6 +161,8 @@ def _one_of(
 def practical(table: Hypotheses, one: Hypothesis) -> dict[str, float]:
     """Label → P_h(practical): the share of DRAWS of x ~ N(x̂, V), its numbers in this hypothesis
     [SI], that are large enough to matter."""
+    if not table.parts.practical_size:
+        return dict.fromkeys(one.causes, 1.0)
     reference, covariance = table.trial.reference, one.found.covariance
     found, at = {}, 0
     for label, numbers in one.found.numbers.items():
@@ -188,19 +190,26 @@ def practical_kind(table: Hypotheses, one: Hypothesis) -> str:
     """Its kind of remainder; process noise as on an ordinary day is nominal. So is a force at one
     place that varies as noise does and is no larger: gusts act at one place, and increase with the
     wind. Noise that no ordinary day has is raised, under whatever prior it was weighed."""
-    if one.kind not in (NOMINAL, RAISED, INTERMITTENT) or device(one):
+    if one.kind not in (NOMINAL, RAISED, INTERMITTENT) or device(one, table.parts.pattern):
         return one.kind
     acceleration = table.trial.reference.process_noise.acceleration
     factor = one.remainder.factor_with_force(one.found.noise_factor, acceleration)
-    ordinary = math.exp(thresholds.ORDINARY_SPREADS * table.trial.nominal_spread)
-    if factor < max(thresholds.ORDINARY_NOISE, ordinary):
+    ordinary = thresholds.ORDINARY_NOISE if table.parts.ordinary_noise else 1.0
+    if table.parts.ordinary_spreads:
+        spread = thresholds.ORDINARY_SPREADS * table.trial.nominal_spread
+        ordinary = max(ordinary, math.exp(spread))
+    if factor < ordinary:
         return NOMINAL
     return RAISED if one.kind == NOMINAL else one.kind
 
 
-def device(one: Hypothesis) -> float:
-    """Probability that what remains is an intermittent force, and that of one device."""
-    return one.side_force.device if one.kind == INTERMITTENT and one.side_force else 0.0
+def device(one: Hypothesis, by_pattern: bool = True) -> float:
+    """Probability that what remains is an intermittent force, and that of one device: by its
+    pattern, or else whether a course that is on or off is more probable."""
+    force = one.side_force
+    if one.kind != INTERMITTENT or force is None:
+        return 0.0
+    return force.device if by_pattern else float(force.course is not None)
 
 
 def share_of_causes(table: Hypotheses, one: Hypothesis, causes: Sequence[str]) -> float:
@@ -230,7 +239,8 @@ def slight(table: Hypotheses, one: Hypothesis, cause: str = "") -> bool:
     whole = one.evidence - less.evidence
     if plain is None or whole <= 0.0:
         return False
-    return one.evidence - plain.evidence <= thresholds.SLIGHT * whole
+    least = thresholds.SLIGHT * whole if table.parts.slight else 0.0
+    return one.evidence - plain.evidence <= least
 
 
 def explain_more(table: Hypotheses, one: Hypothesis, causes: Sequence[str]) -> bool:

@@ -152,7 +152,7 @@ def judged(
         if refutable := _refuted(asked, judges) or _unproved(asked, first):
             names, why = refutable
             bans[names] = why
-            search.without(*names)
+            search.exclude(*names)
             continue
         why = "" if gain.real else _why_in_doubt(search, found, decision, first)
         if why:

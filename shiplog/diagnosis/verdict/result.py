@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from shiplog.diagnosis.hypotheses.relinearisation import converge
+from shiplog.diagnosis.hypotheses.evaluate import resume
 from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
-from shiplog.diagnosis.trial.fitted import ExpectedEvidence, Fit, Found
+from shiplog.diagnosis.trial.fitted import ExpectedEvidence, Fit, Found, Start
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.models.causes import Cause, ParameterEstimate
 
@@ -103,11 +103,11 @@ def without_cause(trial: Trial, decision: Decision, one: Named) -> Decision:
     again = decision.nothing
     if labels:
         numbers = {n: fit.found.numbers[n] for n in labels}
-        point, found = converge(trial, labels, numbers, fit.point.path, remainder=remainder)
-        if found.covariance is None:  # the fit diverged: it has no numbers
+        less = resume(trial, labels, remainder, Start(numbers, fit.point.path))
+        if less.found.covariance is None:  # the fit diverged: it has no numbers
             named = ()
         else:
-            again = Fit(point, found, remainder)
+            again = less
     kept = _fitted_again(again.found, named)
     verdict = "named" if kept or decision.side_force else "none"
     return replace(decision, named=kept, verdict=verdict, fit=again)

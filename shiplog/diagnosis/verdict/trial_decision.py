@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shiplog.diagnosis.decision_parts import ALL, Parts
 from shiplog.diagnosis.hypotheses import evidence
 from shiplog.diagnosis.hypotheses.search import Search
 from shiplog.diagnosis.nominal import placebo
@@ -59,14 +60,16 @@ def decide_trial(
     run: Run, nominal: Record | None, recorded: Record, cut: Windows | None,
     causes: Sequence[Cause], lacking: str, reach: Callable[[str], None] = lambda stage: None,
     barred: Mapping[str, str] | None = None, before: Windows | None = None,
-    read_as: Profile | None = None,
+    read_as: Profile | None = None, parts: Parts = ALL,
 ) -> Decided:  # fmt: skip
     """As `setup.trial_of`; `cut` are the voyages' windows, `before` those of the nominal voyages,
     `read_as` the voyages' own profile, and `reach` is called at each stage."""
 
     def searched(numbers: Mapping[str, np.ndarray] | None = None) -> _Searched:
-        made = setup.trial_of(run, nominal, recorded, causes, lacking, numbers, barred)
-        return _searched(run, made, reach, numbers)
+        made = setup.trial_of(
+            run, nominal, recorded, causes, lacking, numbers, barred=barred, parts=parts
+        )
+        return _searched(run, made, reach, parts, numbers)
 
     found = searched()
     if nominal is None and run.given and (numbers := found.numbers):
@@ -77,7 +80,10 @@ def decide_trial(
     if cut is not None:
         judge = HeldOut(cut, trial_voyages.simulator(run, trial), trial, None, before, read_as)
     reach("held-out voyages")
-    decision, _, gain, refuted = refutation.judged(found.search, judge)
+    refutes = judge if parts.refutation else None
+    decision, _, gain, refuted = refutation.judged(found.search, refutes)
+    if refutes is None and judge is not None and decision.named:
+        gain = judge.gain(decision)
     return Decided(trial, found.untested, found.point, judge, decision, gain, refuted)
 
 
@@ -100,7 +106,7 @@ class _Searched:
 
 
 def _searched(
-    run: Run, made: setup.Setup, reach: Callable[[str], None],
+    run: Run, made: setup.Setup, reach: Callable[[str], None], parts: Parts,
     likely: Mapping[str, np.ndarray] | None,
 ) -> _Searched:  # fmt: skip
     trial, point = evidence.begin(made.trial, run.extension_numbers())
@@ -110,6 +116,6 @@ def _searched(
         trial.reference.counts,
     )  # fmt: skip
     reach("hypotheses")
-    search = Search(trial, point, placebo.placebos(trial.campaign), likely=likely)
+    search = Search(trial, point, placebo.placebos(trial.campaign), likely, parts=parts)
     search.run()
     return _Searched(trial, made.untested, point, search)

@@ -75,7 +75,8 @@ def _residual(done: Diagnosis) -> tuple[pl.DataFrame, tuple[str, ...]]:
     nominal = ref.mean * ref.columns.unit
     process_noise = trial.process_noise(nothing.remainder, whole.cut)
     process_noise = process_noise.times(nothing.found.noise_factor)
-    found = residual_acceleration.posterior(*trial.left(whole, nominal), process_noise, record)
+    residual = trial.less_misfit(whole, nominal)
+    found = residual_acceleration.posterior(*residual, process_noise, record)
     keep = residual_acceleration.unique_instants(found)
     order = np.argsort(found.rows[keep])
     rows = found.rows[keep][order]

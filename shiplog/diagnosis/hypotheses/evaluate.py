@@ -1,9 +1,12 @@
-"""The named causes, linearised again at their estimates, with a path of their own, until they
-converge.
+"""A hypothesis about a trial, fitted: causes and remainder, from a start to a fit.
 
-Gauss-Newton with step halving. The length of a step is measured in standard deviations of the
-numbers (Mahalanobis distance). A step is rejected, and halved, if the numbers are then far less
-probable and the next step is longer.
+Gauss-Newton with step halving. The trial is linearised at the causes' numbers θ₀; the next point is
+the posterior mean A⁻¹ b (7) there, until the step Δ between both is short:
+
+    δ² = Δᵀ Σ⁻¹ Δ,   Σ = P - K S Kᵀ of the causes' numbers                       (14), Mahalanobis
+    δ ρ / (1 - ρ) < LEFT,   ρ = δ / δ_before                 what is left of a geometric series
+
+A step is rejected, and halved, if log p(r, θ₀) is then far lower and the next step is longer.
 """
 
 from __future__ import annotations
@@ -15,9 +18,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shiplog.diagnosis.hypotheses import evidence
-from shiplog.diagnosis.linear.linear_segments import Path
 from shiplog.diagnosis.noise.remainder import Remainder
-from shiplog.diagnosis.trial.fitted import Found, Point
+from shiplog.diagnosis.trial.fitted import Fit, Found, Point, Start
 from shiplog.diagnosis.trial.trial import Trial
 
 RELINEARISATIONS = 10  # of linearising again, at most
@@ -33,67 +35,82 @@ STEADY = 0.05  # of the logarithm of the process noise, from one round to the ne
 
 @dataclass(frozen=True)
 class _Iterate:
-    """A point, the fit made there, and the length of the step to its numbers [sd]."""
+    """A point θ₀, the posterior there, and the length δ of the step to its mean [sd]."""
 
     point: Point
     base: Found
     step: float
 
     def rejected(self, before: _Iterate) -> bool:
-        """Whether the step from the iterate before went too far."""
+        """Whether the step from the iterate before went too far: δ is longer than it was, and the
+        numbers are less probable."""
         lost = before.base.density - self.base.density
         return self.step > before.step and lost > LOST_NATS
 
     def converged(self, before: _Iterate | None, damping: float) -> bool:
         """Whether further steps would change neither the numbers nor the evidence. Convergence is
-        taken for linear; after a damped step its rate is not known."""
-        rate, gained = RATE, math.inf
+        taken for linear, with the rate ρ of the last two steps; after a damped step ρ is not
+        known."""
+        rho, gained = RATE, math.inf
         if before is not None and before.step > 0.0 and damping == 1.0:
-            rate = min(self.step / before.step, 0.99)
+            rho = min(self.step / before.step, 0.99)
             gained = self.base.density - before.base.density
         little = max(gained, 0.5 * self.step**2) < evidence.LITTLE_NATS
-        return little or self.step * rate / (1.0 - rate) < LEFT
+        return little or self.step * rho / (1.0 - rho) < LEFT
 
     def at_point(self) -> Found:
         """The fit with the point's own numbers, in the order of its covariance, without the gain
-        that the step promises."""
-        stood = {name: self.point.numbers[name] for name in self.base.numbers}
-        return replace(self.base, numbers=stood,
+        ½ δ² that the step promises."""
+        at_point = {name: self.point.numbers[name] for name in self.base.numbers}
+        return replace(self.base, numbers=at_point,
                        evidence=self.base.evidence - 0.5 * self.step**2)  # fmt: skip
 
 
-def converge(
-    trial: Trial,
-    included: Sequence[str],
-    numbers: Mapping[str, np.ndarray],
-    path: Path | None,
-    lowest: float = -np.inf,
-    remainder: Remainder = evidence.NO_CHANGE_OF_NOISE,
-) -> tuple[Point, Found]:
-    """These causes together, linearised again until their numbers converge.
+def resume(
+    trial: Trial, included: Sequence[str], remainder: Remainder, start: Start,
+    lowest: float = -np.inf, *, anew: bool = False,
+) -> Fit:  # fmt: skip
+    """`evaluate`, from where an earlier fit of this hypothesis converged, if there was one.
 
-    They start from where an earlier fit of them converged, if there was one. A step is rejected,
-    too, if the evidence is below the `lowest` that is possible, about a path that the process noise
-    found there allows. A fit that does not converge has the evidence of the most probable numbers
-    that it met.
+    anew   from `start` nevertheless
     """
-    # where each channel has a factor of its own the common one stays near 1; an intermittent force
-    # is estimated together with the nominal process noise, which is then kept
-    noise_factor, lately = 1.0, 1.0 if remainder.shaped else None
-    held = remainder.intermittent is not None
-    near: Path | Point | None = path
-    key = (tuple(included), remainder)
-    if key in trial.converged:
-        numbers, near, noise_factor = trial.converged[key]
-        lately = noise_factor
+    starts, key = trial.cache.starts, (tuple(included), remainder)
+    if anew:
+        starts.pop(key, None)
+    fit = evaluate(trial, included, remainder, starts.get(key, start), lowest)
+    if fit.found.evidence != -math.inf:
+        starts[key] = fit.start
+    return fit
+
+
+def evaluate(
+    trial: Trial, included: Sequence[str], remainder: Remainder, start: Start,
+    lowest: float = -np.inf,
+) -> Fit:  # fmt: skip
+    """These causes with this remainder, linearised again until their numbers converge: numbers,
+    covariance (7), evidence (3) and the point of them. It depends on its arguments alone.
+
+    A step is rejected, too, if the evidence is below the `lowest` that is possible, about a path
+    that the process noise found there allows. A fit that does not converge has the evidence of the
+    most probable numbers that it met; one that diverges has none.
+    """
+    name = "+".join(included)
+    numbers, near, noise_factor, lately = start.numbers, start.path, 1.0, start.noise_factor
+    if lately is not None:
+        noise_factor = lately
+    elif remainder.shaped:
+        # where each channel has a factor of its own the common one stays near 1; an intermittent
+        # force is estimated together with the nominal process noise, which is then kept
+        lately = 1.0
+    with_force = remainder.intermittent is not None
     last: _Iterate | None = None  # that was accepted
     best: _Iterate | None = None
     halvings, damping = 0, 1.0  # of a step; it grows back once steps are accepted
-    steady = held  # whether the process noise has converged: a round then keeps it
+    steady = with_force  # whether the process noise has converged: a round then keeps it
     for _ in range(RELINEARISATIONS):
         try:
             point = trial.at(numbers, near, noise_factor, remainder)
-            base = _fitted(trial, point, included, remainder, lately, steady)
+            base = _posterior(trial, point, included, remainder, lately, steady)
             if base.evidence < lowest:
                 if abs(math.log(base.noise_factor / noise_factor)) < STEADY:
                     raise np.linalg.LinAlgError("a step too far")
@@ -107,41 +124,29 @@ def converge(
             if halvings == MOST_HALVINGS or not free:
                 break
             halvings, damping = halvings + 1, 0.5 * damping
-            half = _half_way(numbers, last.point.numbers if last else None, free[-1])
+            half = _halved(numbers, last.point.numbers if last else None, free[-1])
             numbers = trial.clipped(half)
             continue
         converged = here.converged(last, damping)
         settled = lately is not None and abs(math.log(base.noise_factor / lately)) < STEADY
-        kept, steady = steady, held or settled
+        kept, steady = steady, with_force or settled
         last, damping = here, damping if halvings else min(2.0 * damping, 1.0)
         halvings = 0
         if best is None or base.density >= best.base.density:
             best = here
         near, noise_factor = point, base.noise_factor
-        numbers = trial.clipped(_towards(base.numbers, point.numbers, damping))
+        numbers = trial.clipped(_interpolated(base.numbers, point.numbers, damping))
         lately = noise_factor
         if not all(np.isfinite(values).all() for values in numbers.values()):
-            return point, replace(base, name="+".join(included), evidence=-np.inf)
+            return Fit(point, replace(base, name=name, evidence=-np.inf), remainder)
         if converged:
-            if kept and not held:
+            if kept and not with_force:
                 base, _ = evidence.scan(trial, point, (), included, lately, remainder)
-            trial.converged[key] = (base.numbers, point.path, base.noise_factor)
-            return point, replace(base, name="+".join(included))
-    return _not_converged(trial, included, remainder, best, numbers)
-
-
-def _not_converged(
-    trial: Trial, included: Sequence[str], remainder: Remainder, best: _Iterate | None,
-    numbers: Mapping[str, np.ndarray],
-) -> tuple[Point, Found]:  # fmt: skip
-    """Of a fit that did not converge: the best that it met, or no evidence."""
-    name = "+".join(included)
+            return Fit(point, replace(base, name=name), remainder)
     if best is None:
         assert trial.first is not None
-        return trial.first, Found(name, -np.inf, 1.0, numbers)
-    found = (best.point.numbers, best.point.path, best.base.noise_factor)
-    trial.converged[tuple(included), remainder] = found
-    return best.point, replace(best.at_point(), name=name)
+        return Fit(trial.first, Found(name, -np.inf, 1.0, numbers), remainder)
+    return Fit(best.point, replace(best.at_point(), name=name), remainder)
 
 
 def _length(point: Point, base: Found, included: Sequence[str]) -> float:
@@ -153,11 +158,12 @@ def _length(point: Point, base: Found, included: Sequence[str]) -> float:
     return math.sqrt(max(float(step @ np.linalg.solve(base.covariance, step)), 0.0))
 
 
-def _fitted(
+def _posterior(
     trial: Trial, point: Point, included: Sequence[str], remainder: Remainder,
     lately: float | None, steady: bool,
 ) -> Found:  # fmt: skip
-    """The hypothesis at a point. Raises np.linalg.LinAlgError where the path diverged."""
+    """The hypothesis at a point, over λ, or at the λ of the last round where that is steady.
+    Raises np.linalg.LinAlgError where the path diverged."""
     if np.abs(point.linear.e).max() > AWAY:
         raise np.linalg.LinAlgError("the path diverged")
     if steady and lately is not None:
@@ -165,16 +171,16 @@ def _fitted(
     return evidence.scan(trial, point, (), included, lately, remainder)[0]
 
 
-def _half_way(
+def _halved(
     numbers: Mapping[str, np.ndarray], accepted: Mapping[str, np.ndarray] | None, last: str
 ) -> Mapping[str, np.ndarray]:
     """Half a step from the accepted numbers; where there are none, half of the last free cause."""
     if accepted is None:
         return {**numbers, last: 0.5 * numbers[last]}
-    return _towards(numbers, accepted, 0.5)
+    return _interpolated(numbers, accepted, 0.5)
 
 
-def _towards(
+def _interpolated(
     numbers: Mapping[str, np.ndarray], begin: Mapping[str, np.ndarray], share: float
 ) -> Mapping[str, np.ndarray]:
     """A share of the step from `begin` to these numbers."""
