@@ -51,8 +51,8 @@ def afloat(tmp_path_factory):
     _, recorded = in_ship_time(run, None, record_of(store, names, run.profile))
     made = []
 
-    def kept(*given):
-        made.append(trial_of(*given))
+    def kept(*given, **named):
+        made.append(trial_of(*given, **named))
         return made[-1]
 
     with pytest.MonkeyPatch.context() as patch:

@@ -69,7 +69,7 @@ def test_too_little_is_reported_and_nothing_named(sea):
 def test_a_model_without_a_path_is_a_verdict(sea, monkeypatch):
     """Whatever the numerics do ends as an answer: nothing is named and nothing raised."""
 
-    def singular(*_):
+    def singular(*_, **__):
         raise np.linalg.LinAlgError("Matrix is not positive definite")
 
     monkeypatch.setattr(setup, "trial_of", singular)
