@@ -78,5 +78,5 @@ def searched(hidden, placebo=None, likely=None, **setting) -> Search:
 def raised_noise() -> np.ndarray:
     """[S, 3J] three times the nominal process noise."""
     plain, _ = trial_with({})
-    kernel = np.linalg.cholesky(straight.PROCESS_NOISE.kernel(plain.grid.knots))
+    kernel = np.linalg.cholesky(straight.PROCESS_NOISE.kernel(plain.grid.nodes))
     return 3.0 * np.random.default_rng(6).standard_normal((8, len(kernel))) @ kernel.T

@@ -27,7 +27,7 @@ from shiplog.diagnosis.trial.trial import Trial
 from shiplog.models.causes import Cause, Parameter, Setting
 from shiplog.ship_profile import file as profiles
 from shiplog.voyages.rows.recording import Record
-from shiplog.voyages.rows.timescale import KNOT, SEGMENT_S
+from shiplog.voyages.rows.timescale import NODE_STEP, SEGMENT_S
 
 PROFILE = profiles.load("esso-vectwin")
 NOISE = np.array([0.02, 0.01, 0.03, 0.015, 0.004, 0.002])
@@ -114,8 +114,8 @@ def passed(
     rng = np.random.default_rng(seed)
     g = segments.grid(record)
     cut = segments.cut(record, segments.begins(record))
-    knots, count = g.knots, columns.linearised
-    size = 6 + 3 * knots
+    nodes, count = g.nodes, columns.linearised
+    size = 6 + 3 * nodes
     z = rng.standard_normal((*cut.y.shape, size)) * NOISE[:, None] * 3.0
     j = rng.standard_normal((*cut.y.shape, count)) * NOISE[:, None] * sensitivity
     j = j / columns.unit[:count]
@@ -126,14 +126,14 @@ def passed(
         drawn = own.standard_normal((*cut.y.shape, len(at))) * NOISE[:, None] * sensitivity
         j[..., at] = drawn / columns.unit[at]
     d = np.zeros(count) if numbers is None else numbers
-    kernel = np.linalg.cholesky(PROCESS_NOISE.kernel(knots))
+    kernel = np.linalg.cholesky(PROCESS_NOISE.kernel(nodes))
     start = PROCESS_NOISE.start * rng.standard_normal((len(cut), 6))
-    acceleration = noise * rng.standard_normal((len(cut), 3 * knots)) @ kernel.T
+    acceleration = noise * rng.standard_normal((len(cut), 3 * nodes)) @ kernel.T
     if accelerations is not None:
         acceleration = acceleration + accelerations
     moved = np.einsum("sbcz,sz->sbc", z, np.concatenate((start, acceleration), 1))
     e = moved + j @ d + noise * NOISE * rng.standard_normal(cut.y.shape)
-    path = Path(np.zeros((len(cut), 6)), np.zeros((len(cut), 3, knots)))
+    path = Path(np.zeros((len(cut), 6)), np.zeros((len(cut), 3, nodes)))
     return Linear(cut, path, e, z, j)
 
 
@@ -144,15 +144,15 @@ def campaign(
 ) -> Campaign:  # fmt: skip
     """What `nominal_campaign.learn` makes of a pass, with deviations and sizes as given."""
     g = segments.grid(nominal)
-    knots = segment_nodes.at_knots(given.cut, g)
+    nodes = segment_nodes.conditions_at_nodes(given.cut, g)
     first = columns.linearised
     size_of = PROCESS_NOISE.acceleration
     of_own = Discrepancy((), size_of)
     if names:
-        of_own = discrepancy.of(PROFILE, size_of, first, names, knots)
+        of_own = discrepancy.of(PROFILE, size_of, first, names, nodes)
     columns = columns.with_misfit(of_own.count)
     count = len(columns.unit)
-    unseen = discrepancy.of(PROFILE, PROCESS_NOISE.acceleration, count, discrepancy.UNSEEN, knots)
+    unseen = discrepancy.of(PROFILE, PROCESS_NOISE.acceleration, count, discrepancy.UNSEEN, nodes)
     modes = likelihood.modes(likelihood.weighed(given, PROCESS_NOISE), PROCESS_NOISE)
     if of_own.families:
         modes = modes.joined(of_own.accelerations(given.cut, g))
@@ -211,12 +211,12 @@ def no_hull(_: Fit) -> SideForce:
 
 
 def dense(given: Linear, process_noise: ProcessNoise, rows: np.ndarray | None = None):
-    """Of each segment e [N], J [N, C], Z [N, 3J] by the knots and its covariance C [N, N]: start
+    """Of each segment e [N], J [N, C], Z [N, 3J] by the nodes and its covariance C [N, N]: start
     and acceleration in it, explicitly."""
-    knots = (given.z.shape[-1] - 6) // 3
-    at = KNOT * np.arange(knots)
+    nodes = (given.z.shape[-1] - 6) // 3
+    at = NODE_STEP * np.arange(nodes)
     stays = np.exp(-np.abs(at[:, None] - at) / process_noise.time)
-    kernel = np.zeros((6 + 3 * knots,) * 2)
+    kernel = np.zeros((6 + 3 * nodes,) * 2)
     kernel[:6, :6] = np.diag(process_noise.start**2)
     kernel[6:, 6:] = np.kron(np.diag(process_noise.acceleration**2), stays)
     for s in range(len(given.e)) if rows is None else rows:

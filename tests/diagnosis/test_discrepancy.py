@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 import straight
 
-from shiplog.diagnosis.linear.segment_nodes import Knots
+from shiplog.diagnosis.linear.segment_nodes import Nodes
 from shiplog.diagnosis.noise import discrepancy
 from shiplog.diagnosis.noise.discrepancy import SEEN, UNSEEN, WAVES
 from shiplog.ship_profile import file as profiles
 from shiplog.ship_profile.profile import Profile
 
 ACCELERATION = np.array([0.08, 0.05, 0.03])
-NO_GRID: Any = None  # the knots are given: nobody asks where they stand
+NO_GRID: Any = None  # the nodes are given: nobody asks where they stand
 TWIN = straight.PROFILE  # two rudders at -1.5 m, one screw
 
 
@@ -58,15 +58,15 @@ def actuator(name: str, kind: str, place=None, limits=None) -> str:
     )
 
 
-def knots(state=None, controls=None, share=None, wind=None, seed: int = 0) -> Knots:
-    """Four segments of five knots; drawn where nothing is given."""
+def nodes(state=None, controls=None, share=None, wind=None, seed: int = 0) -> Nodes:
+    """Four segments of five nodes; drawn where nothing is given."""
     rng = np.random.default_rng(seed)
     state = rng.standard_normal((4, 5, 6)) if state is None else np.asarray(state, dtype=float)
     shape = state.shape[:2]
     controls = rng.standard_normal((*shape, 3)) if controls is None else controls
     share = rng.uniform(size=(*shape, 1)) if share is None else share
     wind = rng.standard_normal((*shape, 2)) if wind is None else wind
-    return Knots(state, np.concatenate((controls, share, wind), -1))
+    return Nodes(state, np.concatenate((controls, share, wind), -1))
 
 
 def segments_of(factors: dict) -> Any:
@@ -74,12 +74,12 @@ def segments_of(factors: dict) -> Any:
     return SimpleNamespace(factors=factors)
 
 
-def products(name: str, of: Profile, at: Knots) -> np.ndarray:
+def products(name: str, of: Profile, at: Nodes) -> np.ndarray:
     """[S, J, F] of the products alone, before they are scaled."""
     return np.concatenate(discrepancy.PRODUCTS[name](of, at), -1)
 
 
-def one(name: str, of: Profile, *at: Knots) -> discrepancy.Family:
+def one(name: str, of: Profile, *at: Nodes) -> discrepancy.Family:
     (family,) = discrepancy.of(of, ACCELERATION, 0, (name,), *at).families
     return family
 
@@ -94,7 +94,7 @@ def test_products_of_the_motion_by_hand():
     wanted = [
         u, v, r, 0.25, -0.04, 0.01, u * v, u * r, v * r, 0.5 * v, 0.5 * r, 0.2 * r, 0.1 * v,
     ]  # fmt: skip
-    assert products("motion", TWIN, knots(state))[0, 0] == pytest.approx(wanted)
+    assert products("motion", TWIN, nodes(state))[0, 0] == pytest.approx(wanted)
 
 
 def test_a_screw_and_a_rudder_at_another_place_by_hand():
@@ -103,7 +103,7 @@ def test_a_screw_and_a_rudder_at_another_place_by_hand():
     state = np.zeros((1, 1, 6))
     state[..., 1] = -0.5
     angle, n = 0.3, -4.0
-    at = knots(state, np.array([[[angle, n]]]))
+    at = nodes(state, np.array([[[angle, n]]]))
     bent = math.sin(math.pi * angle / math.radians(35.0))
     wanted = [
         -16.0, 4.0 * -0.5,
@@ -128,7 +128,7 @@ def test_a_rudder_that_stops_short_is_a_function_of_its_angle():
     left of its force lies in the family's columns; sin δ alone leaves a tenth of it."""
     of = profile(actuator("rudder", "rudder") + actuator("screw", "propeller"))
     angle = np.linspace(-1.0, 1.0, 41) * math.radians(35.0)
-    at = knots(np.ones((1, 41, 6)), np.stack((angle, np.full(41, 5.0)), -1)[None])
+    at = nodes(np.ones((1, 41, 6)), np.stack((angle, np.full(41, 5.0)), -1)[None])
     acts = np.sin(np.clip(angle, *np.radians([-13.0, 13.0])))
 
     def left(columns: np.ndarray) -> float:
@@ -152,7 +152,7 @@ def test_an_azimuth_turns_the_thruster_at_its_own_place():
     assert discrepancy.driven_by(of, 0, [1, 3, 4]) == [3]
     assert discrepancy.driven_by(of, 2, [1, 3, 4]) == [1]
     given = np.array([[[0.5, 2.0, -0.7, 3.0, 1.0]]])
-    found = products("controls", of, knots(np.zeros((1, 1, 6)), given))[0, 0]
+    found = products("controls", of, nodes(np.zeros((1, 1, 6)), given))[0, 0]
     # three thrusters of two products each, then four of each angle
     assert found[[0, 2, 4]] == pytest.approx([4.0, 9.0, 1.0])
     bow, aft = found[6:10], found[10:14]
@@ -174,7 +174,7 @@ def test_wind_goes_with_its_square_and_harmonics_of_its_angle():
     1 m/s from ahead are felt."""
     state = np.zeros((1, 1, 6))
     state[..., 1], state[..., 4] = 1.0, 0.5 * math.pi
-    at = knots(state, wind=np.array([[[2.0, 0.0]]]))
+    at = nodes(state, wind=np.array([[[2.0, 0.0]]]))
     assert discrepancy.apparent_flow(at)[0, 0] == pytest.approx([1.0, -2.0])
     angle = math.atan2(-2.0, 1.0)
     wanted = [5.0 * f(k * angle) for k in (1, 2, 3) for f in (math.cos, math.sin)]
@@ -185,9 +185,9 @@ def test_wind_goes_with_its_square_and_harmonics_of_its_angle():
 
 
 def test_features_have_unit_size_together_in_each_channel():
-    """Weights of unit variance make an acceleration of unit variance, on average over knots: a
+    """Weights of unit variance make an acceleration of unit variance, on average over nodes: a
     family's size is in units of the process noise."""
-    at = knots(seed=1)
+    at = nodes(seed=1)
     for name in (*SEEN, *UNSEEN):
         family = one(name, TWIN, at)
         features = family.features(at)
@@ -199,7 +199,7 @@ def test_features_have_unit_size_together_in_each_channel():
 
 
 def test_weights_are_channel_by_channel():
-    at = knots(seed=2)
+    at = nodes(seed=2)
     family = one("motion", TWIN, at)
     features, each = family.features(at), len(family.columns) // 3
     for channel in range(3):
@@ -209,7 +209,7 @@ def test_weights_are_channel_by_channel():
 
 
 def test_only_what_no_model_has_is_taken_from_its_mean():
-    at = knots(seed=3)
+    at = nodes(seed=3)
     for name in SEEN:
         assert (one(name, TWIN, at).level == 0.0).all()
     for name in UNSEEN:
@@ -223,7 +223,7 @@ def test_only_what_no_model_has_is_taken_from_its_mean():
 def test_an_even_force_is_steady_or_grows_with_place_or_time_along_the_earths_axes():
     """Weights of the first features: a steady one, then one a metre north and east of the middle,
     or one with time; not divided among the smooth features, and no steady moment."""
-    at = knots(seed=6)
+    at = nodes(seed=6)
     c, s = np.cos(at.state[..., 4]), np.sin(at.state[..., 4])
     for name, inputs in (
         ("position", at.state[..., [0, 2]]), ("heading", np.zeros((*at.state.shape[:2], 0))),
@@ -250,7 +250,7 @@ def test_headings_features_are_harmonics_of_the_angle():
     headings = np.linspace(-3.0, 3.0, 20).reshape(4, 5)
     state = np.zeros((4, 5, 6))
     state[..., 4] = headings
-    waves = one("heading", TWIN, knots(state)).waves
+    waves = one("heading", TWIN, nodes(state)).waves
     scale = math.sqrt(2.0 / WAVES["heading"])
     for psi in (0.0, 0.4, 2.5):
         wanted = [scale * f(k * psi) for k in (1, 2, 3) for f in (math.cos, math.sin)]
@@ -261,12 +261,12 @@ def test_headings_features_are_harmonics_of_the_angle():
 def test_a_pull_towards_the_north_turns_with_the_heading():
     """Four headings at one place: the same force along the earth's axes, whichever way a ship
     lies. North: ahead, then to port, astern, to starboard."""
-    around = knots(seed=4)
+    around = nodes(seed=4)
     family = one("position", TWIN, around)
     state = np.zeros((4, 1, 6))
     state[..., 0], state[..., 2] = 0.7, -0.3
     state[..., 0, 4] = 0.5 * np.pi * np.arange(4)
-    at = Knots(state, around.driven[:, :1])
+    at = Nodes(state, around.driven[:, :1])
     features = family.features(at)
     features = features[..., 3 * discrepancy.EVEN["position"] :]
     each = features.shape[-1] // 3
@@ -286,22 +286,22 @@ def test_families_whose_inputs_do_not_vary_are_absent():
     rng = np.random.default_rng(5)
     still = np.zeros((4, 5, 6))
     still[..., 1] = 0.5
-    calm = knots(still, np.full((4, 5, 3), 0.2), np.full((4, 5, 1), 0.5), np.full((4, 5, 2), 1.5))
+    calm = nodes(still, np.full((4, 5, 3), 0.2), np.full((4, 5, 1), 0.5), np.full((4, 5, 2), 1.5))
     assert discrepancy.of(TWIN, ACCELERATION, 0, (*SEEN, *UNSEEN), calm).families == ()
     # what varies between campaigns is there, though each by itself is still
-    later = Knots(calm.state + 0.1, calm.driven)
+    later = Nodes(calm.state + 0.1, calm.driven)
     found = discrepancy.of(TWIN, ACCELERATION, 0, (*SEEN, *UNSEEN), calm, later)
     assert [f.name for f in found.families] == [
         "motion", "controls", "wind", "position", "heading"
     ]  # fmt: skip
-    moving = knots(rng.standard_normal((4, 5, 6)))
+    moving = nodes(rng.standard_normal((4, 5, 6)))
     whole = discrepancy.of(TWIN, ACCELERATION, 0, (*SEEN, *UNSEEN), moving)
     assert [f.name for f in whole.families] == [*SEEN, *UNSEEN]
 
 
 def test_a_ship_without_a_wind_sensor_has_no_family_of_the_wind():
     of = profile(actuator("screw", "propeller"), wind=False)
-    at = knots(controls=np.random.default_rng(6).standard_normal((4, 5, 1)))
+    at = nodes(controls=np.random.default_rng(6).standard_normal((4, 5, 1)))
     names = [f.name for f in discrepancy.of(of, ACCELERATION, 0, SEEN, at).families]
     assert names == ["motion", "controls"]
 
@@ -309,18 +309,18 @@ def test_a_ship_without_a_wind_sensor_has_no_family_of_the_wind():
 def test_a_feature_that_hardly_varies_is_not_blown_up():
     state = np.random.default_rng(7).standard_normal((4, 5, 6))
     state[..., 5] *= 1e-9  # it hardly turns
-    family = one("motion", TWIN, knots(state))
-    assert np.isfinite(family.features(knots(state))).all()
+    family = one("motion", TWIN, nodes(state))
+    assert np.isfinite(family.features(nodes(state))).all()
     assert family.scale.min() >= 0.999e-3 * family.scale.max()
 
 
 def test_columns_follow_and_accelerations_are_in_units_of_the_process_noise(monkeypatch):
-    at = knots(seed=8)
+    at = nodes(seed=8)
     found = discrepancy.of(TWIN, ACCELERATION, 7, SEEN, at)
     columns = np.concatenate([f.columns for f in found.families])
     assert columns.tolist() == list(range(7, 7 + found.count))
 
-    monkeypatch.setattr(discrepancy.segment_nodes, "at_knots", lambda cut, g: at)
+    monkeypatch.setattr(discrepancy.segment_nodes, "conditions_at_nodes", lambda cut, g: at)
     accelerations = found.accelerations(segments_of({}), NO_GRID)
     assert accelerations.shape == (4, 15, found.count)
     features = np.concatenate([f.features(at) for f in found.families], -1)
@@ -332,16 +332,16 @@ def test_columns_follow_and_accelerations_are_in_units_of_the_process_noise(monk
 def test_a_wind_force_of_another_size_and_an_anemometer_of_another_scale_are_one_error(monkeypatch):
     """A wind that is 1.2 times weaker has 1/1.2² of the force, and so of each product of U_A² with
     an angle: what the model gets wrong must not tell the two apart."""
-    at = knots(state=np.zeros((4, 5, 6)), seed=8)
+    at = nodes(state=np.zeros((4, 5, 6)), seed=8)
     found = discrepancy.of(TWIN, ACCELERATION, 0, SEEN, at)
     driven = at.driven.copy()
     driven[..., -2:] /= 1.2
 
-    def of(there: Knots, factors: dict) -> np.ndarray:
-        monkeypatch.setattr(discrepancy.segment_nodes, "at_knots", lambda cut, g: there)
+    def of(there: Nodes, factors: dict) -> np.ndarray:
+        monkeypatch.setattr(discrepancy.segment_nodes, "conditions_at_nodes", lambda cut, g: there)
         return found.accelerations(segments_of(factors), NO_GRID)
 
-    scale = of(Knots(at.state, driven), {})
+    scale = of(Nodes(at.state, driven), {})
     force = of(at, {"wind": np.full(3, 1.2**-2)})
     (wind,) = (f for f in found.families if f.name == "wind")
     features = len(wind.columns) // 3
@@ -361,7 +361,7 @@ def test_a_wind_force_of_another_size_and_an_anemometer_of_another_scale_are_one
 
 
 def test_the_same_ship_has_the_same_features_every_time():
-    at = knots(seed=9)
+    at = nodes(seed=9)
     for name in (*SEEN, *UNSEEN):
         one_time, another = one(name, TWIN, at), one(name, TWIN, at)
         assert (one_time.features(at) == another.features(at)).all()

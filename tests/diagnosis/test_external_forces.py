@@ -85,8 +85,8 @@ def test_a_receiver_that_stands_still_and_catches_up_is_no_hand(sailed):
     """Position held for 3 s; the velocity that was filtered from it falls, and overshoots."""
     record = under(sailed, (0.0, 0.0, 0.0), noise=0.2)
     state, time = record.state.copy(), record.time
-    knots = START + np.array([-1.0, 1.0, 3.0, 4.0, 6.0])
-    state[:, 1] += 0.4 * np.interp(time, knots, [0.0, -1.0, -1.0, 1.0, 0.0])
+    nodes = START + np.array([-1.0, 1.0, 3.0, 4.0, 6.0])
+    state[:, 1] += 0.4 * np.interp(time, nodes, [0.0, -1.0, -1.0, 1.0, 0.0])
     stopped = found(replace(record, state=state))
     held = (time >= START) & (time < START + 3.0)
     state[held, 0], state[held, 2] = (state[held, i][0] for i in (0, 2))
@@ -104,7 +104,7 @@ def test_full_thrust_is_that_of_the_open_water_diagram(sailed):
 
 
 def test_a_ship_in_tow_has_no_full_thrust_to_compare_with(sailed):
-    """Its screws never turned: 20 N for ten knots of 2 s, against 2 N that its hull can do."""
+    """Its screws never turned: 20 N for ten nodes of 2 s, against 2 N that its hull can do."""
     record = afloat.record(sailed)
     rows = 20 * np.arange(40)
     force = np.zeros((40, 3))
@@ -113,7 +113,7 @@ def test_a_ship_in_tow_has_no_full_thrust_to_compare_with(sailed):
         rows, force, np.full((40, 3), 0.1), np.full((40, 3), 2.0), np.zeros(3), np.zeros(3)
     )
     (stretch,) = external_forces.find(weighed, record)
-    assert (stretch.start_s, stretch.end_s) == (29.0, 49.0)  # half of the peak, between knots
+    assert (stretch.start_s, stretch.end_s) == (29.0, 49.0)  # half of the peak, between nodes
     assert stretch.sentence.startswith("A force of 20 N ahead for 20 s: pushed")
 
 

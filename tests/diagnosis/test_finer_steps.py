@@ -43,7 +43,7 @@ def coasting(segments_on: tuple[int, ...] = ()) -> tuple[Cut, Path, np.ndarray]:
     driven = np.zeros_like(cut.driven)
     driven[list(segments_on), :, 0] = 1.0
     start = np.tile([0.0, 1.0, 0.0, 0.0, 0.0, 0.0], (4, 1))
-    return replace(cut, y=y, driven=driven), Path(start, np.zeros((4, 3, GRID.knots))), y
+    return replace(cut, y=y, driven=driven), Path(start, np.zeros((4, 3, GRID.nodes))), y
 
 
 @pytest.mark.parametrize(("substeps", "many"), [(1, 1), (2, 1), (4, 2), (8, 4)])
@@ -54,7 +54,7 @@ def test_steps_between_nodes_follow_trainings(substeps, many):
 
 
 def test_what_training_holds_is_held_here():
-    """Damping of 7 1/s, stable with four Euler steps a second: u = e^(-7t). With the nodes' step
+    """Damping of 7 1/s, stable with four Euler steps a second: u = e^(-7t). With the instants' step
     alone the speed would grow by half from step to step."""
     cut, at, y = coasting()
     found, columns = linearisation.simulated(Stiff(4), np.array([7.0]), cut, at, GRID)
@@ -84,7 +84,7 @@ def test_columns_between_nodes_are_derivatives_of_what_was_simulated():
     h[:, 1, 7] = 1e-5
     more, less = (replace(at, acceleration=at.acceleration + s) for s in (h, -h))
     slope = (y(theta, more) - y(theta, less)) / 2e-5
-    assert found.z[..., 6 + GRID.knots + 7] == pytest.approx(slope, abs=2e-5)
+    assert found.z[..., 6 + GRID.nodes + 7] == pytest.approx(slope, abs=2e-5)
 
 
 def test_a_ship_that_needs_no_finer_steps_keeps_its_numbers():
@@ -94,12 +94,12 @@ def test_a_ship_that_needs_no_finer_steps_keeps_its_numbers():
     theta = mmg.estimated(ship, main).values
     record = closed.record(profile)
     rows = segments.begins(record)
-    cut, at = segments.cut(record, rows), Path(record.state[rows], np.zeros((4, 3, GRID.knots)))
+    cut, at = segments.cut(record, rows), Path(record.state[rows], np.zeros((4, 3, GRID.nodes)))
     model = mmg.MMG(ship)
     # the last row of what drives is the share of the campaign, before the wind
     plain = replace(cut, driven=np.delete(cut.driven, 3, axis=-1))
     ((_, filled),) = linearisation.chunks(4)  # as many at a time, so that rounding is the same
-    start, acceleration, driven = map(filled, (at.start, at.at_nodes(GRID), plain.driven))
+    start, acceleration, driven = map(filled, (at.start, at.at_instants(GRID), plain.driven))
     states = np.asarray(
         linearisation.states_along(model, theta, start, acceleration, driven, cut.step)
     )[:4]

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from shiplog.diagnosis.linear.linear_segments import Linear, Path
-from shiplog.diagnosis.linear.segment_nodes import at_knots
+from shiplog.diagnosis.linear.segment_nodes import conditions_at_nodes
 from shiplog.diagnosis.linear.segments import Cut, SegmentGrid
 from shiplog.diagnosis.noise import input_misfit, likelihood
 from shiplog.diagnosis.noise.campaign_parts import marginal
 from shiplog.diagnosis.noise.likelihood import ProcessNoise
 from shiplog.models.compiled_network import Network
-from shiplog.voyages.rows.timescale import KNOT, NODE_ROWS
+from shiplog.voyages.rows.timescale import NODE_STEP, STEP_ROWS
 
-KNOTS, BINS, STEP = 6, 5, 0.2
-ROWS = round((KNOTS - 1) * KNOT / STEP)
-GRID = SegmentGrid(STEP, ROWS, ROWS // NODE_ROWS + 1, BINS, KNOTS)
+NODES, BINS, STEP = 6, 5, 0.2
+ROWS = round((NODES - 1) * NODE_STEP / STEP)
+GRID = SegmentGrid(STEP, ROWS, ROWS // STEP_ROWS + 1, BINS, NODES)
 NOISE = np.array([0.02, 0.01, 0.03, 0.015, 0.004, 0.002])
 PROCESS_NOISE = ProcessNoise(NOISE, np.array([0.08, 0.05, 0.03]), 4.0, np.full(6, 1.7))
 
@@ -37,26 +37,26 @@ def segments(count: int, seed: int = 0) -> Cut:
     """Ships that do something else in each segment, in wind that goes with the heading's sine."""
     rng = np.random.default_rng(seed)
     y = np.repeat(rng.standard_normal((count, 1, 6)), BINS, axis=1)
-    driven = np.repeat(rng.standard_normal((count, 1, 5)), GRID.nodes, axis=1)
+    driven = np.repeat(rng.standard_normal((count, 1, 5)), GRID.instants, axis=1)
     used = np.ones((count, BINS, 6), dtype=bool)
     return Cut(np.arange(count), y, used, driven, np.zeros(count, dtype=int), STEP)
 
 
 def acceleration_of(cut: Cut, of) -> np.ndarray:
     """[S, 3J] of an acceleration `of` (state, driven) in sway."""
-    knots = at_knots(cut, GRID)
-    whole = np.zeros((len(cut), 3, KNOTS))
-    whole[:, 1] = 0.2 * of(knots.state, knots.driven)
+    nodes = conditions_at_nodes(cut, GRID)
+    whole = np.zeros((len(cut), 3, NODES))
+    whole[:, 1] = 0.2 * of(nodes.state, nodes.driven)
     return whole.reshape(len(cut), -1)
 
 
 def bent(cut: Cut, hidden: np.ndarray, looks_like: np.ndarray, seed: int = 1) -> Linear:
     """Observations that a hidden acceleration bends, and one column of another."""
     rng = np.random.default_rng(seed)
-    z = rng.standard_normal((*cut.y.shape, 6 + 3 * KNOTS)) * NOISE[:, None] * 20.0
+    z = rng.standard_normal((*cut.y.shape, 6 + 3 * NODES)) * NOISE[:, None] * 20.0
     e = np.einsum("sbcz,sz->sbc", z[..., 6:], hidden) + NOISE * rng.standard_normal(cut.y.shape)
     j = np.einsum("sbcz,sz->sbc", z[..., 6:], looks_like)[..., None]
-    return Linear(cut, Path(np.zeros((len(cut), 6)), np.zeros((len(cut), 3, KNOTS))), e, z, j)
+    return Linear(cut, Path(np.zeros((len(cut), 6)), np.zeros((len(cut), 3, NODES))), e, z, j)
 
 
 def nats(linear: Linear, own: input_misfit.Misfit | None) -> float:
@@ -85,13 +85,13 @@ def test_what_it_bends_the_network_by_is_its_acceleration():
     hidden = acceleration_of(cut, lambda s, d: np.sin(s[..., 1]))
     own = learned(bent(cut, hidden, hidden))
     weights = np.random.default_rng(3).standard_normal(own.count)
-    knots, plain = at_knots(cut, GRID), network()
-    given = (knots.state, knots.driven[..., :2], knots.driven[..., -2:])
+    nodes, plain = conditions_at_nodes(cut, GRID), network()
+    given = (nodes.state, nodes.driven[..., :2], nodes.driven[..., -2:])
     none = np.zeros(0)
     apart = plain.bend(own.bends(weights)).acceleration(none, *given) - plain.acceleration(
         none, *given
     )
-    accelerations = (own.accelerations(cut, GRID) @ weights).reshape(len(cut), 3, KNOTS)
+    accelerations = (own.accelerations(cut, GRID) @ weights).reshape(len(cut), 3, NODES)
     assert np.moveaxis(accelerations, 1, -1) == pytest.approx(np.asarray(apart), abs=1e-9)
     twice = plain.bend(own.bends(weights)).bend(own.bends(weights))
     assert twice.bent == pytest.approx(2.0 * own.bends(weights))

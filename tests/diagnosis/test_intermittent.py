@@ -32,9 +32,9 @@ def reference(monkeypatch):
 def passed(force: float):
     """A pass of segments, on a third of which so many newtons act at one place."""
     record = straight.sailed(COUNT)
-    knots = segments.grid(record).knots
+    nodes = segments.grid(record).nodes
     unit = ACROSS + LEVER * SETTING.scale["length"] * TURNING
-    on = np.random.default_rng(4).random((COUNT, knots)) < 0.3
+    on = np.random.default_rng(4).random((COUNT, nodes)) < 0.3
     accelerations = force * unit[None, :, None] * on[:, None]
     return straight.passed(
         record, straight.columns_of(()), accelerations=accelerations.reshape(COUNT, -1), seed=5
@@ -54,10 +54,10 @@ def test_noise_is_raised_in_each_channel_by_as_much_as_was_drawn():
     """In addition to the nominal noise: three times that in sway, as much as that in surge."""
     count = 4 * COUNT  # so that the spread of a drawn factor is 4 %
     record, drawn_by = straight.sailed(count), np.array([1.0, 3.0, 1.5])
-    knots = segments.grid(record).knots
+    nodes = segments.grid(record).nodes
     more = replace(PROCESS_NOISE, acceleration=PROCESS_NOISE.acceleration * drawn_by)
-    drawn = np.random.default_rng(8).standard_normal((count, 3 * knots))
-    accelerations = drawn @ np.linalg.cholesky(more.kernel(knots)).T
+    drawn = np.random.default_rng(8).standard_normal((count, 3 * nodes))
+    accelerations = drawn @ np.linalg.cholesky(more.kernel(nodes)).T
     linear = straight.passed(record, straight.columns_of(()), accelerations=accelerations, seed=5)
     left = left_by(linear, np.ones(count))
     value, remainder = raised_noise.by_channel(left)
@@ -81,11 +81,11 @@ def test_raised_noise_lasts_as_long_as_was_drawn():
     """Three times as large and five times as long as the nominal noise, which is nearly nothing."""
     count = 2 * COUNT
     record = straight.sailed(count)
-    knots = segments.grid(record).knots
+    nodes = segments.grid(record).nodes
     small = replace(PROCESS_NOISE, acceleration=0.1 * PROCESS_NOISE.acceleration)
     more = replace(PROCESS_NOISE.times(3.0), time=5.0 * PROCESS_NOISE.time)
-    drawn = np.random.default_rng(8).standard_normal((count, 3 * knots))
-    accelerations = drawn @ np.linalg.cholesky(more.kernel(knots)).T
+    drawn = np.random.default_rng(8).standard_normal((count, 3 * nodes))
+    accelerations = drawn @ np.linalg.cholesky(more.kernel(nodes)).T
     linear = straight.passed(record, straight.columns_of(()), accelerations=accelerations, seed=5)
     none = np.zeros(linear.j.shape[-1])
     left = raised_noise.left_by(linear, none, small, np.ones(count), 1.0)
@@ -109,14 +109,14 @@ def test_a_force_lasts_as_long_as_was_drawn(reference):
     """Twice and half the usual time, of a force that is large next to the noise."""
     unit = ACROSS + LEVER * SETTING.scale["length"] * TURNING
     record = straight.sailed(4 * COUNT)
-    knots, usual = segments.grid(record).knots, PROCESS_NOISE.intermittent_time
+    nodes, usual = segments.grid(record).nodes, PROCESS_NOISE.intermittent_time
     for lasts in (0.5, 2.0):
         alone = replace(
             PROCESS_NOISE, acceleration=1e-6 * PROCESS_NOISE.acceleration,
             intermittent=20.0 * unit, intermittent_time=lasts * usual,
         )  # fmt: skip
-        drawn = np.random.default_rng(3).standard_normal((4 * COUNT, 3 * knots))
-        pushed = drawn @ np.linalg.cholesky(alone.kernel(knots)).T
+        drawn = np.random.default_rng(3).standard_normal((4 * COUNT, 3 * nodes))
+        pushed = drawn @ np.linalg.cholesky(alone.kernel(nodes)).T
         linear = straight.passed(record, straight.columns_of(()), accelerations=pushed, seed=5)
         found = estimated(linear, np.ones(4 * COUNT), reference)
         assert found.lasts == pytest.approx(lasts, rel=0.4)
@@ -130,12 +130,12 @@ def test_a_force_lasts_as_long_as_was_drawn(reference):
 def test_noise_that_is_raised_in_two_channels_is_no_force_at_one_place(reference):
     """Raised in sway and yaw, independently of each other, and nominal in surge."""
     record = straight.sailed(COUNT)
-    knots = segments.grid(record).knots
+    nodes = segments.grid(record).nodes
     more = replace(
         PROCESS_NOISE, acceleration=PROCESS_NOISE.acceleration * np.array([1e-3, 2.0, 2.0])
     )
-    drawn = np.random.default_rng(8).standard_normal((COUNT, 3 * knots))
-    accelerations = drawn @ np.linalg.cholesky(more.kernel(knots)).T
+    drawn = np.random.default_rng(8).standard_normal((COUNT, 3 * nodes))
+    accelerations = drawn @ np.linalg.cholesky(more.kernel(nodes)).T
     linear = straight.passed(record, straight.columns_of(()), accelerations=accelerations, seed=5)
     assert estimated(linear, np.ones(COUNT), reference).gain < 0.0
 
@@ -185,7 +185,7 @@ def pushed(force: float, seed: int = 4):
     record, columns = straight.sailed(COUNT), straight.columns_of(())
     grid = segments.grid(record)
     unit = ACROSS + LEVER * SETTING.scale["length"] * TURNING
-    on = np.zeros((COUNT, grid.knots), dtype=bool)
+    on = np.zeros((COUNT, grid.nodes), dtype=bool)
     on[1::3, 4:10] = True
     way = np.random.default_rng(seed).choice([-1.0, 1.0], COUNT)[:, None]
     accelerations = (unit[None, :, None] * (force * way * on)[:, None]).reshape(COUNT, -1)
@@ -209,7 +209,7 @@ def test_a_device_is_on_where_it_pushes(hull):
     trial, on = pushed(150.0)
     found = intermittent.side_force(trial, left_with(trial, Remainder()))
     assert found.device == 1.0 and found.course is not None
-    rows = segment_nodes.rows_at_knots(trial.rows, trial.grid)
+    rows = segment_nodes.rows_of_nodes(trial.rows, trial.grid)
     starts, ends = rows[1::3, 4], rows[1::3, 9]
     assert found.course.on == tuple(zip(starts.tolist(), ends.tolist(), strict=True))
     assert found.lever / SETTING.scale["length"] == pytest.approx(LEVER, abs=0.02)
@@ -226,14 +226,14 @@ def test_a_device_is_on_where_it_pushes(hull):
 
 
 def test_the_times_of_a_device_are_those_of_its_pulses(hull):
-    """From half of the time between two knots before its first one to as long after its last."""
+    """From half of the time between two nodes before its first one to as long after its last."""
     trial, _ = pushed(150.0)
     found = intermittent.side_force(trial, left_with(trial, Remainder()))
     fit = left_with(trial, found.remainder)
     times = intermittent.active_intervals(trial, fit, found)
-    begins, knot = trial.record.time[trial.rows], trial.grid.knot
-    assert [one["start_s"] for one in times] == (begins[1::3] + 3.5 * knot).tolist()
-    assert [one["end_s"] for one in times] == (begins[1::3] + 9.5 * knot).tolist()
+    begins, node_step = trial.record.time[trial.rows], trial.grid.node_step
+    assert [one["start_s"] for one in times] == (begins[1::3] + 3.5 * node_step).tolist()
+    assert [one["end_s"] for one in times] == (begins[1::3] + 9.5 * node_step).tolist()
     assert {one["voyage"] for one in times} == set(trial.record.names)
     ways = np.random.default_rng(4).choice([-1.0, 1.0], COUNT)[1::3]  # as they were drawn
     strongest = [one["force_N"] for one in times]
@@ -264,8 +264,8 @@ def test_a_force_that_varies_has_no_course(hull):
     unit = ACROSS + LEVER * SETTING.scale["length"] * TURNING
     varies = replace(PROCESS_NOISE, acceleration=1e-6 * PROCESS_NOISE.acceleration,
                      intermittent=20.0 * unit)  # fmt: skip
-    drawn = np.random.default_rng(3).standard_normal((4 * COUNT, 3 * segments.grid(record).knots))
-    accelerations = drawn @ np.linalg.cholesky(varies.kernel(segments.grid(record).knots)).T
+    drawn = np.random.default_rng(3).standard_normal((4 * COUNT, 3 * segments.grid(record).nodes))
+    accelerations = drawn @ np.linalg.cholesky(varies.kernel(segments.grid(record).nodes)).T
     given = straight.passed(record, columns, accelerations=accelerations, seed=5)
     trial = straight.trial(made, record, given)
     found = intermittent.side_force(trial, left_with(trial, Remainder()))

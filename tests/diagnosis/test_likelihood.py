@@ -11,13 +11,13 @@ from shiplog.diagnosis.linear.segments import Cut
 from shiplog.diagnosis.noise import likelihood, noise_estimate
 from shiplog.diagnosis.noise.likelihood import ProcessNoise
 from shiplog.diagnosis.nominal.nominal_reference import inflation, marginal, nominal_information
-from shiplog.voyages.rows.timescale import KNOT
+from shiplog.voyages.rows.timescale import NODE_STEP
 
 NOISE = np.array([0.02, 0.01, 0.03, 0.015, 0.004, 0.002])
 PROCESS_NOISE = ProcessNoise(NOISE, np.array([0.8, 0.5, 0.3]), 5.0, np.full(6, 1.7))
 
 
-def linear(segments: int, bins: int = 4, knots: int = 3, columns: int = 2, seed: int = 0) -> Linear:
+def linear(segments: int, bins: int = 4, nodes: int = 3, columns: int = 2, seed: int = 0) -> Linear:
     """Random columns; a few observations unused."""
     rng = np.random.default_rng(seed)
     shape = (segments, bins, 6)
@@ -25,21 +25,21 @@ def linear(segments: int, bins: int = 4, knots: int = 3, columns: int = 2, seed:
     used[0, 1] = False
     cut = Cut(np.arange(segments), np.zeros(shape), used, np.zeros((segments, 1, 1)),
               np.zeros(segments, dtype=int), 0.2)  # fmt: skip
-    size = 6 + 3 * knots
+    size = 6 + 3 * nodes
     z = rng.standard_normal((*shape, size)) * NOISE[:, None] * 5.0
     j = rng.standard_normal((*shape, columns)) * NOISE[:, None] * 3.0
-    path = Path(np.zeros((segments, 6)), np.zeros((segments, 3, knots)))
+    path = Path(np.zeros((segments, 6)), np.zeros((segments, 3, nodes)))
     return Linear(cut, path, rng.standard_normal(shape) * NOISE, z, j)
 
 
-def covariance(process_noise: ProcessNoise, knots: int, segment: int = 0) -> np.ndarray:
+def covariance(process_noise: ProcessNoise, nodes: int, segment: int = 0) -> np.ndarray:
     """Of z, written out: free start, and accelerations that stay for `time` seconds."""
-    at = KNOT * np.arange(knots)
+    at = NODE_STEP * np.arange(nodes)
     stays = np.exp(-np.abs(at[:, None] - at) / process_noise.time)
-    whole = np.zeros((6 + 3 * knots,) * 2)
+    whole = np.zeros((6 + 3 * nodes,) * 2)
     whole[:6, :6] = np.diag(process_noise.start**2)
     for channel in range(3):
-        part = slice(6 + channel * knots, 6 + (channel + 1) * knots)
+        part = slice(6 + channel * nodes, 6 + (channel + 1) * nodes)
         whole[part, part] = process_noise.acceleration[channel] ** 2 * stays
     if process_noise.intermittent is not None:
         stays = np.exp(-np.abs(at[:, None] - at) / process_noise.intermittent_time)
@@ -70,9 +70,9 @@ def _gram(weighed: likelihood.Weighed, process_noise: ProcessNoise) -> likelihoo
 def dense(given: Linear, process_noise: ProcessNoise, fitted: bool = False):
     """Of each segment: the observations used, their columns, and C = R + Z K Zᵀ, explicitly.
     `fitted`: without what the start adds to it."""
-    knots = (given.z.shape[-1] - 6) // 3
+    nodes = (given.z.shape[-1] - 6) // 3
     for s in range(len(given.e)):
-        kernel = covariance(process_noise, knots, s)
+        kernel = covariance(process_noise, nodes, s)
         if fitted:
             kernel[:6] = 0.0
         used = given.cut.used[s].ravel()
@@ -90,7 +90,7 @@ COLOURED = replace(
     PROCESS_NOISE, coloured=np.array([0.9, 0.5, 0.0, 0.3, 0.7, 0.95]),
     fade=np.array([1.0, 8.0, 1.0, 2.0, 3.0, 16.0]),
 )  # fmt: skip
-# On in the first two knots of three, in none, and in two that are not of one run.
+# On in the first two nodes of three, in none, and in two that are not of one run.
 ON_OFF = replace(
     INTERMITTENT, runs=np.array([[[1, 1, 0], [1, 1, 0], [0, 0, 0]], np.zeros((3, 3)),
                                  [[1, 0, 0], [0, 0, 0], [0, 0, 1]]])
@@ -224,10 +224,10 @@ def test_one_pass_serves_every_size_of_process_noise():
 
 
 @EACH
-def test_start_and_knots_are_the_posterior_mean(process_noise):
+def test_start_and_accelerations_are_the_posterior_mean(process_noise):
     """K Zᵀ C⁻¹ (e - J d), written out."""
     given, d = linear(3), np.array([0.3, -0.7])
-    found, _ = likelihood.starts_and_knots(given, d, process_noise)
+    found, _ = likelihood.starts_and_accelerations(given, d, process_noise)
     for s, (e, j, c) in enumerate(dense(given, process_noise)):
         kernel = covariance(process_noise, 3, s)
         z = given.z[s].reshape(-1, 15)[given.cut.used[s].ravel()]
@@ -259,14 +259,14 @@ def test_marginal_is_the_dense_gaussian():
 
 
 def test_an_intermittent_force_acts_on_all_channels_together():
-    """Covariance of channel a at knot i and b at knot k: p_a p_b e^(-|t|/12 s), and the process
+    """Covariance of channel a at node i and b at node k: p_a p_b e^(-|t|/12 s), and the process
     noise's own only within a channel."""
     kernel = INTERMITTENT.kernel(4)
     acceleration, intermittent = INTERMITTENT.acceleration, np.array([0.0, 0.9, -0.4])
     for a in range(3):
         for b in range(3):
             for i, k in ((0, 0), (0, 2), (3, 1)):
-                far = abs(i - k) * KNOT
+                far = abs(i - k) * NODE_STEP
                 value = intermittent[a] * intermittent[b] * np.exp(-far / 12.0)
                 if a == b:
                     value += acceleration[a] ** 2 * np.exp(-far / 5.0)
@@ -286,7 +286,7 @@ def test_precision_is_the_inverse():
 def test_sizes_are_learnt_from_draws_of_the_model():
     """Both noises as drawn, from a beginning that is wrong by a factor of three."""
     rng = np.random.default_rng(11)
-    given = linear(250, bins=10, knots=5)
+    given = linear(250, bins=10, nodes=5)
     kernel = covariance(PROCESS_NOISE, 5)
     z = rng.multivariate_normal(np.zeros(len(kernel)), kernel, len(given.e))
     d = np.array([0.3, -0.7])
@@ -305,7 +305,7 @@ def test_sizes_learnt_are_the_likeliest():
     """Within five rounds, from a beginning that is wrong by a factor of ten: at another size of any
     of them, the dense likelihood is less. White noise, whose colour is not estimated."""
     rng = np.random.default_rng(13)
-    given = linear(20, bins=10, knots=5)
+    given = linear(20, bins=10, nodes=5)
     used = rng.random(given.e.shape[:2]) > 0.3  # hardly ever whole
     given = replace(given, cut=replace(given.cut, used=np.repeat(used[..., None], 6, -1)))
     kernel = covariance(PROCESS_NOISE, 5)
@@ -334,7 +334,7 @@ def test_colour_of_the_noise_is_learnt_from_draws_of_it():
     """Four fifths of one channel's noise last for 4 s; the others' is white. A few segments with
     holes take no part, and a campaign of nothing else says nothing."""
     rng = np.random.default_rng(12)
-    given = linear(400, bins=15, knots=5)
+    given = linear(400, bins=15, nodes=5)
     share = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.8])
     true = replace(PROCESS_NOISE, coloured=share, fade=np.full(6, 4.0))
     kernel, d = covariance(true, 5), np.array([0.3, -0.7])

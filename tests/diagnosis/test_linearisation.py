@@ -75,7 +75,9 @@ def gap(model, theta, at: Path, numbers) -> np.ndarray:
     record = measurement_correction.corrected(model.causes, RECORD, numbers)
     cut = segments.cut(record, ROWS)
     states = np.asarray(
-        linearisation.states_along(model, theta, at.start, at.at_nodes(GRID), cut.driven, cut.step)
+        linearisation.states_along(
+            model, theta, at.start, at.at_instants(GRID), cut.driven, cut.step
+        )
     )
     pairs = 0.5 * (states[:, 1:] + states[:, :-1])
     return cut.y - pairs.reshape(len(ROWS), GRID.bins, -1, 6).mean(2)
@@ -97,14 +99,14 @@ def test_columns_of_the_start(linearised, column):
     assert found.z[..., column] == pytest.approx(-slope, abs=2e-6)
 
 
-@pytest.mark.parametrize(("channel", "knot"), [(0, 0), (1, 7), (2, 3), (2, 15)])
-def test_columns_of_the_knots(linearised, channel, knot):
+@pytest.mark.parametrize(("channel", "node"), [(0, 0), (1, 7), (2, 3), (2, 15)])
+def test_columns_of_the_nodes(linearised, channel, node):
     model, numbers, theta, at, found = linearised
     h = np.zeros_like(at.acceleration)
-    h[:, channel, knot] = 1e-5
+    h[:, channel, node] = 1e-5
     more, less = (replace(at, acceleration=at.acceleration + s) for s in (h, -h))
     slope = (gap(model, theta, more, numbers) - gap(model, theta, less, numbers)) / 2e-5
-    column = found.z[..., 6 + channel * GRID.knots + knot]
+    column = found.z[..., 6 + channel * GRID.nodes + node]
     assert np.abs(column).max() > 0.1
     assert column == pytest.approx(-slope, abs=2e-5)
 
@@ -162,7 +164,7 @@ def test_a_delay_is_what_it_is_and_zero_is_zero(late):
     model = Toy((RudderDelay(),))
     cut, moved, observed = measurement_correction.read(model, SETTING, record, ROWS)
     theta = np.concatenate((THETA, [0.0]))
-    at = Path(record.state[ROWS], np.zeros((4, 3, GRID.knots)))
+    at = Path(record.state[ROWS], np.zeros((4, 3, GRID.nodes)))
     found = linearisation.linear(model, theta, cut, GRID, at, moved, observed)
     rows = found.e[..., 4:].ravel()  # heading and yaw rate
     start = found.z[..., 4:, 4:6].reshape(len(rows), 2)

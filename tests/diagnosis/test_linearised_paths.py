@@ -9,7 +9,7 @@ from toy_ship import GRID, RECORD, ROWS, SETTING, THETA, WIDE, Coasting, Toy, pa
 from shiplog.diagnosis.linear import linearisation, measurement_correction, segments
 from shiplog.diagnosis.linear.linear_segments import Path
 from shiplog.diagnosis.linear.segments import Cut
-from shiplog.voyages.rows.timescale import KNOT, Timescale
+from shiplog.voyages.rows.timescale import NODE_STEP, Timescale
 
 
 def simulated(at: Path, theta: np.ndarray = THETA) -> Cut:
@@ -20,7 +20,7 @@ def simulated(at: Path, theta: np.ndarray = THETA) -> Cut:
 
 
 def test_nothing_is_left_of_what_the_model_made():
-    at = replace(path(), acceleration=np.zeros((4, 3, GRID.knots)))
+    at = replace(path(), acceleration=np.zeros((4, 3, GRID.nodes)))
     cut = simulated(at)
     none = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
     found = linearisation.linear(Toy(), THETA, cut, GRID, at, *none)
@@ -33,7 +33,7 @@ def test_nothing_is_left_of_what_the_model_made():
 def test_slopes_of_a_smooth_model_go_straight_between_seconds():
     """One in a second serves the toy, whose rudder goes slowly: what it bends by is within 1 % of
     what every node's slopes say, and what is constant stays exact."""
-    at = replace(path(), acceleration=np.zeros((4, 3, GRID.knots)))
+    at = replace(path(), acceleration=np.zeros((4, 3, GRID.nodes)))
     cut = simulated(at)
     none = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
     exact, found = (
@@ -54,7 +54,7 @@ def test_slopes_of_a_smooth_model_go_straight_between_seconds():
 
 def test_a_path_is_pulled_onto_a_known_acceleration():
     """Smooth accelerations of 0.02 m/s²: the path goes where they went, and finds them."""
-    t = KNOT * np.arange(GRID.knots)
+    t = NODE_STEP * np.arange(GRID.nodes)
     acceleration = np.stack(
         (0.02 * np.sin(0.2 * t), 0.015 * np.cos(0.25 * t), 0.004 * np.sin(0.3 * t))
     )
@@ -64,13 +64,13 @@ def test_a_path_is_pulled_onto_a_known_acceleration():
     y, _ = linearisation.simulated(Toy(), THETA, cut, found, GRID)
     assert y == pytest.approx(cut.y, abs=1e-4)
     assert found.start == pytest.approx(true.start, abs=2e-3)
-    # within, where bins on both sides see a knot
+    # within, where bins on both sides see a node
     assert found.acceleration[..., 1:-1] == pytest.approx(true.acceleration[..., 1:-1], abs=2e-3)
 
 
 def test_a_path_is_pulled_until_it_converges():
     """From a start that is far off, two rounds leave it far from where it ends."""
-    true = replace(path(), acceleration=np.zeros((4, 3, GRID.knots)))
+    true = replace(path(), acceleration=np.zeros((4, 3, GRID.nodes)))
     cut = simulated(true)
     start = true.start + np.array([30.0, 0.0, -30.0, 0.0, 2.0, 0.05])
     free = replace(WIDE, start=1e3 * WIDE.start)
@@ -87,7 +87,7 @@ def test_a_path_is_pulled_until_it_converges():
 def test_a_path_held_firmly_follows_the_acceleration_that_is_expected_of_it():
     """Held to what is expected, it is the true path at once; held to none, it has no acceleration
     and is off. The same where a linearisation says where it will be."""
-    t = KNOT * np.arange(GRID.knots)
+    t = NODE_STEP * np.arange(GRID.nodes)
     acceleration = np.stack(
         (0.02 * np.sin(0.2 * t), 0.015 * np.cos(0.25 * t), 0.004 * np.sin(0.3 * t))
     )
@@ -113,7 +113,7 @@ def test_a_path_held_firmly_follows_the_acceleration_that_is_expected_of_it():
 def test_a_path_that_is_not_finite_is_lost_by_itself():
     """As of a model without an acceleration at a measured state: rows of zeros, and the other
     segments as they were."""
-    true = replace(path(), acceleration=np.zeros((4, 3, GRID.knots)))
+    true = replace(path(), acceleration=np.zeros((4, 3, GRID.nodes)))
     cut = simulated(true)
     broken = replace(true, acceleration=true.acceleration.copy())
     broken.acceleration[1, 0, 3] = np.nan
@@ -132,7 +132,7 @@ def test_a_path_is_pulled_on_a_longer_grid_too():
     """Segments of 60 s with nodes of 4 s: accelerations found from the record on."""
     viewed = replace(RECORD, timescale=Timescale(60.0, 4.0, 4.0))
     g, rows = segments.grid(viewed), segments.begins(viewed)
-    t = g.knot * np.arange(g.knots)
+    t = g.node_step * np.arange(g.nodes)
     acceleration = np.stack(
         (0.02 * np.sin(0.1 * t), 0.015 * np.cos(0.12 * t), 0.002 * np.sin(0.15 * t))
     )
@@ -148,7 +148,7 @@ def test_a_path_is_pulled_on_a_longer_grid_too():
 
 
 def test_what_was_not_used_does_not_pull():
-    true = replace(path(), acceleration=np.zeros((4, 3, GRID.knots)))
+    true = replace(path(), acceleration=np.zeros((4, 3, GRID.nodes)))
     cut = simulated(true)
     used = cut.used.copy()
     used[:, 6:8] = False
@@ -163,7 +163,7 @@ def test_a_linearisation_expects_where_its_path_will_be_pulled():
     """There is no acceleration but the rudder's, a tenth less than the model's: pulled, the path
     has one that makes up for it. Once the model has it right there is none, and what is expected
     before that is linearised there is off by what is not linear: a tenth of the tenth."""
-    true = replace(path(), acceleration=np.zeros((4, 3, GRID.knots)))
+    true = replace(path(), acceleration=np.zeros((4, 3, GRID.nodes)))
     cut = simulated(true)
     wrong, tight = THETA * np.array([1.0, 1.1, 1.0, 1.0]), replace(WIDE, noise=0.01 * WIDE.noise)
     stood = linearisation.pulled(Toy(), wrong, cut, GRID, tight)

@@ -9,12 +9,12 @@ from scipy.integrate import quad
 
 from shiplog.diagnosis.noise import on_off
 
-KNOTS = 16
+NODES = 16
 
 
 def rows_of(segments: int) -> np.ndarray:
-    """[S, J] of segments that meet: the last knot of one is the first of the next."""
-    return 150 * np.arange(segments)[:, None] + 10 * np.arange(KNOTS)
+    """[S, J] of segments that meet: the last node of one is the first of the next."""
+    return 150 * np.arange(segments)[:, None] + 10 * np.arange(NODES)
 
 
 def test_the_most_probable_course_of_all():
@@ -32,7 +32,7 @@ def test_the_most_probable_course_of_all():
 
 
 def test_pulses_are_found_where_they_are():
-    """Of 3 N, to either side, next to noise of 0.2 N; one knot of 1 N is no pulse."""
+    """Of 3 N, to either side, next to noise of 0.2 N; one node of 1 N is no pulse."""
     rng, rows = np.random.default_rng(0), rows_of(20)
     on = np.zeros(rows.shape, dtype=bool)
     for segment in range(0, 20, 2):
@@ -42,7 +42,7 @@ def test_pulses_are_found_where_they_are():
     found = on_off.course(force, np.full(on.shape, 0.2), rows)
     assert found is not None
     assert found.on == tuple((150 * s + 40, 150 * s + 90) for s in range(0, 20, 2))
-    # what is on across the knot that two segments share is one run
+    # what is on across the node that two segments share is one run
     on[0, 10:] = on[1, :3] = True
     across = on_off.course(3.0 * on, np.full(on.shape, 0.2), rows)
     assert across is not None and across.on[0] == (40, 170)
@@ -61,7 +61,7 @@ def test_the_prior_of_a_course_is_that_of_any_probability_of_a_change():
     assert on_off._log_prior(course) == pytest.approx(math.log(0.5 * of_each**2))
 
 
-def test_knots_of_one_run_belong_together():
+def test_nodes_of_one_run_belong_together():
     """On from row 30 to row 60, and from 80 on; of a segment that begins at row 20."""
     rows = 20 + 10 * np.arange(8)[None]
     found = on_off.runs(((30, 60), (80, 200)), rows)[0]

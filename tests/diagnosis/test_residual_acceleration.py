@@ -35,12 +35,12 @@ def rested(lengths: tuple[int, ...], voyages: tuple[int, ...]) -> Record:
 
 def observed_directly(y: np.ndarray, rows: np.ndarray) -> Linear:
     """Observations of the nodes themselves: [S, 3, J] as u, v, r of bins 0 to J - 2."""
-    count, _, knots = y.shape
-    bins = knots - 1
-    e, z = np.zeros((count, bins, 6)), np.zeros((bins, 6, 6 + 3 * knots))
+    count, _, nodes = y.shape
+    bins = nodes - 1
+    e, z = np.zeros((count, bins, 6)), np.zeros((bins, 6, 6 + 3 * nodes))
     for channel, column in enumerate((1, 3, 5)):
         e[:, :, column] = y[:, channel, :bins]
-        z[np.arange(bins), column, 6 + channel * knots + np.arange(bins)] = 1.0
+        z[np.arange(bins), column, 6 + channel * nodes + np.arange(bins)] = 1.0
     used = np.zeros((count, bins, 6), dtype=bool)
     used[..., [1, 3, 5]] = True
     cut = Cut(rows, e, used, np.zeros((count, 1, 6)), np.zeros(count, dtype=int), 0.2)
@@ -92,7 +92,7 @@ def test_each_instant_counts_once_and_by_the_better_known():
     )
     keep = residual_acceleration.unique_instants(found)
     rows = np.sort(found.rows[keep])
-    assert np.diff(rows).min() >= 10  # knots are 20 rows apart; no pair is nearer than half of it
+    assert np.diff(rows).min() >= 10  # nodes are 20 rows apart; no pair is nearer than half of it
     assert rows[0] == 0
     assert rows[-1] == 699
     assert not keep[0, 15]  # measured at the next segment's first node, here by nothing

@@ -1,4 +1,4 @@
-"""Segments: where they lie, what a bin is, and what drives between nodes."""
+"""Segments: where they lie, what a bin is, and what drives between instants."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ from shiplog.diagnosis.linear import segment_nodes, segments
 from shiplog.diagnosis.linear.measurement_correction import as_hypothesised, water
 from shiplog.diagnosis.noise import discrepancy
 from shiplog.models.causes import Current, WindForce
-from shiplog.voyages.rows.timescale import NODE_ROWS
+from shiplog.voyages.rows.timescale import STEP_ROWS
 
 
 def test_segments_lie_end_to_end_within_stretches():
@@ -47,12 +47,12 @@ def test_the_discrepancy_sees_the_motion_through_the_water_and_the_wind_over_it(
     ])  # fmt: skip
     cut = segments.cut(replace(RECORD, state=np.tile(drift, (len(RECORD), 1))), ROWS)
     driven = cut.driven.copy()
-    over_ground = segment_nodes.at_knots(cut, GRID)
-    wet = segment_nodes.at_knots(replace(cut, water=np.array([north, east])), GRID)
-    assert wet.state[..., [1, 3, 5]] == pytest.approx(np.zeros((4, GRID.knots, 3)), abs=1e-12)
+    over_ground = segment_nodes.conditions_at_nodes(cut, GRID)
+    wet = segment_nodes.conditions_at_nodes(replace(cut, water=np.array([north, east])), GRID)
+    assert wet.state[..., [1, 3, 5]] == pytest.approx(np.zeros((4, GRID.nodes, 3)), abs=1e-12)
     assert wet.state[..., [0, 2, 4]] == pytest.approx(over_ground.state[..., [0, 2, 4]])
     assert wet.driven[..., -2:] - over_ground.driven[..., -2:] == pytest.approx(
-        np.tile((north, east), (4, GRID.knots, 1))
+        np.tile((north, east), (4, GRID.nodes, 1))
     )
     assert discrepancy.apparent_flow(wet) == pytest.approx(discrepancy.apparent_flow(over_ground))
     assert (cut.driven == driven).all()
@@ -80,7 +80,7 @@ def test_bins_that_were_hardly_measured_do_not_count():
 def test_what_drives_is_taken_between_nodes_too():
     """Actuators, share and true wind at the nodes, ¼ ½ ¼; a ramp is left as it is."""
     cut = segments.cut(RECORD, ROWS)
-    share = RECORD.share[ROWS[1] + NODE_ROWS * np.arange(GRID.nodes)]
+    share = RECORD.share[ROWS[1] + STEP_ROWS * np.arange(GRID.instants)]
     assert cut.driven[1, 1:, 2] == pytest.approx(share[1:], abs=1e-12)
     assert cut.driven[1, :, 3:] == pytest.approx(np.tile(closed.TRUE_WIND, (151, 1)), abs=1e-12)
     spike = np.zeros((len(RECORD), 2))

@@ -159,8 +159,8 @@ def test_the_best_level_is_the_one_that_was_drawn(made):
     nominal, record, _ = made
     rng = np.random.default_rng(8)
     plain = straight.trial(*made)
-    kernel = np.linalg.cholesky(PROCESS_NOISE.kernel(plain.grid.knots))
-    more = math.sqrt(3.0) * rng.standard_normal((8, 3 * plain.grid.knots)) @ kernel.T
+    kernel = np.linalg.cholesky(PROCESS_NOISE.kernel(plain.grid.nodes))
+    more = math.sqrt(3.0) * rng.standard_normal((8, 3 * plain.grid.nodes)) @ kernel.T
     given = straight.passed(
         record, straight.columns_of(CAUSES), seed=2, sensitivity=0.3, accelerations=more
     )

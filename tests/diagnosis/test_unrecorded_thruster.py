@@ -20,16 +20,16 @@ def test_an_unrecorded_thruster_is_placed_where_it_stands(monkeypatch):
     rng = np.random.default_rng(5)
     ship, coefficients = afloat.MODEL, dict(zip(afloat.MODEL.names, afloat.THETA, strict=True))
     unit = unrecorded_thruster.accelerations(ship, coefficients, np.array([[0.0, 1.0, 1.1]]))[0]
-    knots, count = 16, 300
+    nodes, count = 16, 300
     process_noise = replace(afloat.PROCESS_NOISE, intermittent=1.7 * unit)
-    z = np.eye(6 + 3 * knots)[None].repeat(count, 0)  # all of it measured, as well as a node can be
-    drawn = np.zeros((count, 6 + 3 * knots, 1))
+    z = np.eye(6 + 3 * nodes)[None].repeat(count, 0)  # all of it measured, as well as a node can be
+    drawn = np.zeros((count, 6 + 3 * nodes, 1))
     drawn[:, 6:, 0] = rng.multivariate_normal(
-        np.zeros(3 * knots), process_noise.kernel(knots), count
+        np.zeros(3 * nodes), process_noise.kernel(nodes), count
     )
     sure = 1e12
     weighed = likelihood.Weighed(
-        sure * np.swapaxes(drawn, 1, 2) @ drawn, sure * drawn, sure * z, 0.0, knots
+        sure * np.swapaxes(drawn, 1, 2) @ drawn, sure * drawn, sure * z, 0.0, nodes
     )
     reference = SimpleNamespace(
         model=SimpleNamespace(stand_in=ship), coefficients=coefficients,
@@ -39,9 +39,9 @@ def test_an_unrecorded_thruster_is_placed_where_it_stands(monkeypatch):
         np.arange(count), np.zeros((count, 1, 6)), np.ones((count, 1, 6), dtype=bool),
         np.zeros((count, 1, 1)), np.zeros(count), 0.2,
     )  # fmt: skip
-    path = linear_segments.Path(np.zeros((count, 6)), np.zeros((count, 3, knots)))
+    path = linear_segments.Path(np.zeros((count, 6)), np.zeros((count, 3, nodes)))
     linear = linear_segments.Linear(
-        cut, path, np.zeros((count, 1, 6)), np.zeros((count, 1, 6, 6 + 3 * knots)),
+        cut, path, np.zeros((count, 1, 6)), np.zeros((count, 1, 6, 6 + 3 * nodes)),
         np.zeros((count, 1, 6, 0)),
     )  # fmt: skip
     monkeypatch.setattr(likelihood, "weighed", lambda *_: weighed)

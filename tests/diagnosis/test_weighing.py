@@ -45,7 +45,7 @@ def pushed_at_one_place(unit):
         straight.PROCESS_NOISE, acceleration=1e-6 * straight.PROCESS_NOISE.acceleration,
         intermittent=2.0 * unit,
     )  # fmt: skip
-    kernel = np.linalg.cholesky(alone.kernel(plain.grid.knots))
+    kernel = np.linalg.cholesky(alone.kernel(plain.grid.nodes))
     drawn = np.random.default_rng(6).standard_normal((8, len(kernel)))
     return trial_with({}, accelerations=drawn @ kernel.T)
 

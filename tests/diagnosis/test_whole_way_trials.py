@@ -146,7 +146,7 @@ def test_what_a_lag_would_change_is_after_a_step_and_not_before(sea):
         0, :, 0, column
     ]
     # straight from row to row: the step is half a row before
-    t = (900 - 1000 + 0.5 + timescale.NODE_ROWS * np.arange(len(moved))) * observed.step
+    t = (900 - 1000 + 0.5 + timescale.STEP_ROWS * np.arange(len(moved))) * observed.step
     assert np.abs(moved[t < -0.15]).max() == 0.0
     after = (t > 0.15) & (t < 5.0 * time)
     assert moved[after] == pytest.approx(-0.2 * np.exp(-t[after] / time) / time, rel=0.02)

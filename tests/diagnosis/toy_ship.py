@@ -65,7 +65,7 @@ WIDE = Wide(
 def path() -> Path:
     rng = np.random.default_rng(0)
     start = RECORD.state[ROWS]
-    return Path(start, 0.01 * rng.standard_normal((len(ROWS), 3, GRID.knots)))
+    return Path(start, 0.01 * rng.standard_normal((len(ROWS), 3, GRID.nodes)))
 
 
 def nothing(cut: Cut) -> tuple[np.ndarray, np.ndarray]:

@@ -123,7 +123,7 @@ def test_both_sides_are_averaged_alike():
 
 def rolled(segments: int, numbers, seed: int = 0, columns: int = 5, noise=NOISE) -> Linear:
     """Random columns; what was measured is a free start, those numbers and white noise, as if no
-    acceleration at the knots had ever been there."""
+    acceleration at the nodes had ever been there."""
     rng = np.random.default_rng(seed)
     shape = (segments, 8, 6)
     used = np.ones(shape, dtype=bool)

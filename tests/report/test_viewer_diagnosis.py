@@ -37,7 +37,7 @@ def tracks(voyage, model, speed):
 
 
 def forces(voyage, named=True):
-    """Knots of 2 s, except that nothing is known of 20 s to 40 s."""
+    """Nodes of 2 s, except that nothing is known of 20 s to 40 s."""
     time = np.array([t for t in np.arange(0.0, 200.0, 2.0) if not 20 <= t <= 40])
     tables = [
         pl.DataFrame({"voyage": [voyage] * len(time), "time": time}).with_columns(

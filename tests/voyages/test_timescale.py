@@ -1,4 +1,4 @@
-"""Segments in units of the ship: how long, what a bin and a knot are, and cut on a longer grid."""
+"""Segments in units of the ship: how long, what a bin and a node are, and cut on a longer grid."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ from shiplog.diagnosis.linear import segments
 from shiplog.diagnosis.trial import trial_voyages
 from shiplog.ship_profile import file as profiles
 from shiplog.voyages.rows import timescale
-from shiplog.voyages.rows.timescale import NODE_ROWS, Timescale
+from shiplog.voyages.rows.timescale import STEP_ROWS, Timescale
 
 RECORD = closed.record(profiles.load("esso-osaka"))  # 120 s
 
@@ -34,18 +34,18 @@ def test_a_three_metre_ship_keeps_half_a_minute(speed):
 def test_larger_and_slower_ships_have_longer_segments(length, speed, seconds):
     found = timescale.of_ship(length, speed)
     assert found.seconds == pytest.approx(seconds)
-    assert found.bin == found.knot == pytest.approx(seconds / 15)
+    assert found.bin == found.node_step == pytest.approx(seconds / 15)
 
 
 @pytest.mark.parametrize("time", np.geomspace(1.0, 200.0, 25))
 def test_every_scale_fits_the_rows(time):
-    """Bins and knots lie on nodes, of records at 10 Hz; 15 bins, 16 knots; four ship times, within
+    """Bins and nodes lie on nodes, of records at 10 Hz; 15 bins, 16 nodes; four ship times, within
     a factor of two where it is not at a bound."""
     found = timescale.of_ship(time, 1.0)
     g = segments.grid(replace(RECORD, timescale=found))
-    assert (g.bins, g.knots) == (15, 16)
+    assert (g.bins, g.nodes) == (15, 16)
     assert g.rows == round(found.seconds / 0.1) == 15 * round(found.bin / 0.1)
-    assert (g.nodes - 1) % 15 == 0 and g.rows % g.every == 0 and g.every % NODE_ROWS == 0
+    assert (g.instants - 1) % 15 == 0 and g.rows % g.every == 0 and g.every % STEP_ROWS == 0
     assert g.weights.sum(1) == pytest.approx(1.0)  # hats add up to one everywhere
     if 21.0 < found.seconds < 240.0:
         assert 2.0 < found.seconds / time < 6.1
@@ -53,7 +53,14 @@ def test_every_scale_fits_the_rows(time):
 
 def test_the_grid_that_nobody_scales_is_todays():
     g = segments.grid(RECORD)
-    assert (g.seconds, g.bin, g.knot, g.nodes, g.bins, g.knots) == (30.0, 2.0, 2.0, 151, 15, 16)
+    assert (g.seconds, g.bin, g.node_step, g.instants, g.bins, g.nodes) == (
+        30.0,
+        2.0,
+        2.0,
+        151,
+        15,
+        16,
+    )
 
 
 def test_on_a_longer_grid_a_bin_is_a_longer_mean():
@@ -65,7 +72,7 @@ def test_on_a_longer_grid_a_bin_is_a_longer_mean():
     cut = segments.cut(ramp, rows)
     middle = 60.0 * np.arange(2)[:, None] + 4.0 * np.arange(15) + 2.0
     assert cut.y == pytest.approx(np.repeat(middle[..., None], 6, -1), abs=1e-9)
-    assert cut.driven.shape[1] == g.nodes == 151
+    assert cut.driven.shape[1] == g.instants == 151
 
 
 def test_a_short_campaign_has_shorter_segments():
@@ -81,7 +88,7 @@ def test_what_drives_a_node_is_the_mean_of_the_rows_about_it():
     ramp = replace(closed.record(profiles.load("esso-osaka")), timescale=Timescale(60.0, 4.0, 4.0))
     g, rows = segments.grid(ramp), segments.begins(ramp)
     values = np.random.default_rng(0).standard_normal((len(ramp), 2))
-    found = segments.at_nodes(ramp, rows, values)
+    found = segments.at_instants(ramp, rows, values)
     assert g.every == 4
     at = rows[1] + 7 * 4
     row = 0.5 * (values[at - 2] + values[at + 2]) + values[at - 1 : at + 2].sum(0)

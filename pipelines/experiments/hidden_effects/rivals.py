@@ -221,7 +221,7 @@ def learnt(linear: Linear, columns: Columns, start: np.ndarray, noise: np.ndarra
         total = white_total(linear, noise, start, unit)[: base + 1, : base + 1]
         known = np.diag(columns.known[:base])
         numbers[:base] = np.linalg.solve(total[1:, 1:] + known, total[1:, 0]) * unit[:base]
-        z, covariance = likelihood.starts_and_knots(alone, numbers, _quiet(noise, start))
+        z, covariance = likelihood.starts_and_accelerations(alone, numbers, _quiet(noise, start))
         gap = linear.e - linear.j @ numbers - np.einsum("sbcz,sz->sbc", alone.z, z)
         spread = np.einsum("sbcy,syz,sbcz->sbc", alone.z, covariance, alone.z, optimize=True)
         used = linear.cut.used
@@ -238,7 +238,7 @@ def _units(columns: Columns) -> np.ndarray:
 def white_total(
     linear: Linear, noise: np.ndarray, start: np.ndarray, unit: np.ndarray
 ) -> np.ndarray:
-    """[1 + C, 1 + C] products of [e | J] in units, the starts eliminated, no knots."""
+    """[1 + C, 1 + C] products of [e | J] in units, the starts eliminated, no nodes."""
     by = np.concatenate(([1.0], unit))
     quiet = _quiet(noise, start)
     total = likelihood.modes(likelihood.weighed(_white(linear), quiet), quiet).total(
@@ -248,7 +248,7 @@ def white_total(
 
 
 def _white(linear: Linear) -> Linear:
-    """Without the acceleration's knots: what the model does not explain is noise."""
+    """Without the acceleration's nodes: what the model does not explain is noise."""
     return replace(linear, z=linear.z[..., :6])
 
 

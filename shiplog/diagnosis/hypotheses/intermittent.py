@@ -114,7 +114,7 @@ def side_force(trial: Trial, fit: Fit, at_one_place: Remainder | None = None) ->
     if found.device == 0.0:
         return found
     kept = trial.weight > 0.0
-    rows = segment_nodes.rows_at_knots(trial.rows[kept], trial.grid)
+    rows = segment_nodes.rows_of_nodes(trial.rows[kept], trial.grid)
     courses = (on_off.course(force[kept], np.abs(deviation[kept]), rows), fit.remainder.course)
     devices = (
         unrecorded_thruster.estimate_on_off_force(left, trial.reference, found, course, rows)
@@ -148,8 +148,8 @@ def force_at_nodes(
     if process_noise is None:
         process_noise = trial.process_noise(fit.remainder).times(fit.found.noise_factor)
     left = fits.residual(trial, fit.point.linear, fit)
-    z, covariance = likelihood.starts_and_knots(*left, process_noise)
-    a, V, J = z[:, 6:, None], covariance[:, 6:, 6:], trial.grid.knots
+    z, covariance = likelihood.starts_and_accelerations(*left, process_noise)
+    a, V, J = z[:, 6:, None], covariance[:, 6:, 6:], trial.grid.nodes
     Q = process_noise.kernel(J)
     force_alone = replace(process_noise, acceleration=NO_NOISE * process_noise.acceleration)
     Q_f = force_alone.kernel(J)
@@ -169,9 +169,9 @@ def active_intervals(trial: Trial, fit: Fit, side_force: SideForce) -> list[dict
     """When the unrecorded thruster worked: voyage, start_s, end_s, strongest force_N and its sd_N.
     It starts and stops between two nodes, on average half of the time between them away."""
     force, sd = force_at_nodes(trial, fit, side_force)
-    rows = segment_nodes.rows_at_knots(trial.rows, trial.grid)
+    rows = segment_nodes.rows_of_nodes(trial.rows, trial.grid)
     course = side_force.course or on_off.course(force, np.abs(sd), rows)
-    record, half = trial.record, 0.5 * trial.grid.knot
+    record, half = trial.record, 0.5 * trial.grid.node_step
     times: list[dict] = []
     for first, last in course.on if course else ():
         size = np.where((rows >= first) & (rows <= last), np.abs(force), -1.0)

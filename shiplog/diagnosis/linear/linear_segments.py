@@ -17,7 +17,7 @@ class Path:
     start: np.ndarray
     acceleration: np.ndarray
 
-    def at_nodes(self, g: SegmentGrid) -> np.ndarray:
+    def at_instants(self, g: SegmentGrid) -> np.ndarray:
         """Σⱼ hⱼ(tₖ) aⱼ*: the acceleration at the K instants of the steps [S, K, 3]."""
         return np.einsum("scj,kj->skc", self.acceleration, g.weights)
 

@@ -7,7 +7,7 @@ simulation is linear:
 
     y ≈ y* + Z (z - z*) + H d,   d = θ - θ*
 
-Where training divided a second into several steps, the time between two nodes is divided too. A
+Where training divided a second into several steps, the time between two instants is divided too. A
 segment in which the model still diverges is left out and counted (`Linear.lost`).
 """
 
@@ -50,7 +50,7 @@ class Smooth(Physical, Protocol):
 
 
 def stable_steps(model: Smooth, step: float) -> int:
-    """Steps between two nodes with which the integration is as stable as in training.
+    """Steps between two instants with which the integration is as stable as in training.
 
     On the negative real axis the explicit Euler method is stable for |λ| h up to 2, two-step
     Adams-Bashforth up to 1 (Hairer, Nørsett & Wanner 1993, Sec. III.1 and V.1): of a model that
@@ -128,13 +128,13 @@ def first_path(model: Smooth, theta: np.ndarray, segments: Cut, g: SegmentGrid) 
     by differences of the means of bins, less the model's at the measured state."""
     y = segments.y
     centre = (np.arange(g.bins) + 0.5) * g.bin
-    nodes = np.arange(g.knots) * g.knot
+    nodes = np.arange(g.nodes) * g.node_step
     velocity = y[..., [1, 3, 5]]
     change = np.diff(velocity, axis=1) / g.bin
     at = 0.5 * (centre[1:] + centre[:-1])
     accelerated = resampled(at, change, nodes)
     states = resampled(centre, y, nodes)
-    per = round(g.knot / (g.step * g.every))
+    per = round(g.node_step / (g.step * g.every))
     modelled = accelerations(model, theta, states, segments.driven[:, ::per])
     start = y[:, 0] - 0.5 * (y[:, 1] - y[:, 0])
     return Path(start, np.moveaxis(accelerated - modelled, -1, 1))
@@ -267,7 +267,7 @@ def linear(
         segments = replace(segments, used=used)
         y, columns = np.where(lost[:, None, None], segments.y, y), columns.copy()
         columns[lost], observed = 0.0, np.where(lost[:, None, None, None], 0.0, observed)
-    size = 6 + 3 * g.knots
+    size = 6 + 3 * g.nodes
     read = moved.shape[-1]
     z, j = columns[..., :size].copy(), columns[..., size:].copy()
     j[..., len(theta) - read :] -= observed
@@ -312,14 +312,14 @@ def _along(model, theta, states, driven, step, *, coefficients) -> list[np.ndarr
     P; P only where `coefficients` are asked for]. Those of a model that is smooth and takes long (a
     network) are worked out as often as they change, and go straight between:
     A(tₖ) = A_left + (tₖ - t_left)/(t_right - t_left) (A_right - A_left)."""
-    nodes = states.shape[1]
+    instants = states.shape[1]
     stride = max(round(model.smooth / step), 1)
-    at = np.unique(np.append(np.arange(0, nodes, stride), nodes - 1))
+    at = np.unique(np.append(np.arange(0, instants, stride), instants - 1))
     # one compilation serves both: it takes longer than all that it saves to leave θ out
     *found, by_theta = _slopes(model, theta, states[:, at], driven[:, at])
     found.append(by_theta if coefficients else np.zeros((3, 0, by_theta.shape[-1]), np.float32))
-    right = np.clip(np.searchsorted(at, np.arange(nodes)), 1, len(at) - 1)
-    part = ((np.arange(nodes) - at[right - 1]) / (at[right] - at[right - 1])).astype(np.float32)
+    right = np.clip(np.searchsorted(at, np.arange(instants)), 1, len(at) - 1)
+    part = ((np.arange(instants) - at[right - 1]) / (at[right] - at[right - 1])).astype(np.float32)
     every = []
     for values in found:
         values = np.asarray(values).reshape(*values.shape[:2], len(states), len(at))
@@ -341,8 +341,8 @@ def _every(model, theta, segments, path, g, moved):
     """`simulated`, chunk by chunk: y_b = (1/T) ∫ x dt over each bin of T s, by the trapezium."""
     many = stable_steps(model, segments.step)
     step = segments.step / many
-    acceleration, hats = path.at_nodes(g), _between(g.weights[None], many)[0]
-    per = many * (g.nodes - 1) // g.bins
+    acceleration, hats = path.at_instants(g), _between(g.weights[None], many)[0]
+    per = many * (g.instants - 1) // g.bins
     ys, columns = [], []
     for part, filled in chunks(len(segments)):
         driven = _between(filled(segments.driven), many)

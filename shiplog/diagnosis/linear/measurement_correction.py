@@ -105,10 +105,10 @@ def read(
             )
             # of what both share nothing changes
             if more.actuator is not less.actuator:
-                change = segments.at_nodes(record, rows, more.actuator - less.actuator)
+                change = segments.at_instants(record, rows, more.actuator - less.actuator)
                 moved[..., : change.shape[-1], column] = change / apart
             if more.wind is not less.wind or more.state is not less.state:
-                change = segments.at_nodes(record, rows, more.true_wind - less.true_wind)
+                change = segments.at_instants(record, rows, more.true_wind - less.true_wind)
                 moved[..., -2:, column] = change / apart
             if more.state is not less.state:
                 between = replace(more, state=more.state - less.state)

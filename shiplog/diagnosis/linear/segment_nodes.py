@@ -15,8 +15,8 @@ from shiplog.nomenclature import frames
 
 
 @dataclass(frozen=True)
-class Knots:
-    """What went on at the knots of S segments.
+class Nodes:
+    """What went on at the nodes of S segments.
 
     state   [S, J, 6]      velocities through the water
     driven  [S, J, A + 3]  actuators, share of the campaign, wind over the water
@@ -26,13 +26,13 @@ class Knots:
     driven: np.ndarray
 
 
-def at_knots(segments: Cut, g: SegmentGrid) -> Knots:
+def conditions_at_nodes(segments: Cut, g: SegmentGrid) -> Nodes:
     """State and what drives at the nodes, the measured means of bins straight in between. Through
     water that moves with V: (u, v) - Rᵀ(ψ) V, and the wind over the water W + V, where W is where
     the wind comes from."""
     centre = (np.arange(g.bins) + 0.5) * g.seconds / g.bins
-    every = round(g.knot / (g.step * g.every))
-    state = resampled(centre, segments.y, np.arange(g.knots) * g.knot)
+    every = round(g.node_step / (g.step * g.every))
+    state = resampled(centre, segments.y, np.arange(g.nodes) * g.node_step)
     driven = segments.driven[:, ::every]
     if segments.water.any():
         north, east = segments.water
@@ -42,12 +42,12 @@ def at_knots(segments: Cut, g: SegmentGrid) -> Knots:
         state[..., 3] -= starboard
         driven = driven.copy()
         driven[..., -2:] += segments.water  # the apparent wind stays as it is
-    return Knots(state, driven)
+    return Nodes(state, driven)
 
 
-def rows_at_knots(begins: np.ndarray, g: SegmentGrid) -> np.ndarray:
+def rows_of_nodes(begins: np.ndarray, g: SegmentGrid) -> np.ndarray:
     """Row of the record at each node [S, J], of segments that begin at these rows [S]."""
-    return begins[:, None] + round(g.knot / g.step) * np.arange(g.knots)
+    return begins[:, None] + round(g.node_step / g.step) * np.arange(g.nodes)
 
 
 def in_each_channel(waves: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from shiplog.voyages.rows.recording import Record
-from shiplog.voyages.rows.timescale import BIN, KNOT, NODE_ROWS
+from shiplog.voyages.rows.timescale import BIN, NODE_STEP, STEP_ROWS
 
 PER_SEGMENT = ("rows", "y", "used", "driven", "voyage")  # of a Cut
 
@@ -24,9 +24,9 @@ class Cut:
     rows    [S]            first row of each
     y       [S, B, 6]      what was measured, averaged over bins
     used    [S, B, 6]      bool
-    driven  [S, K, A + 3]  actuators, share of the campaign, true wind: at the steps' nodes
+    driven  [S, K, A + 3]  actuators, share of the campaign, true wind: at the steps' instants
     voyage  [S]            counts in the record's names
-    step                   s between the steps' nodes
+    step                   s between the steps' instants
     water   [2]            velocity of the water along x₀ and y₀ [m/s]; the discrepancy depends on
                            the motion through it
     factors                family of the discrepancy → factor [3] of the forces that depend on its
@@ -61,12 +61,12 @@ class SegmentGrid:
 
     step: float  # s between rows
     rows: int  # of a segment, less one
-    nodes: int  # K, instants of the integration's steps
+    instants: int  # K, instants of the integration's steps
     bins: int  # B
-    knots: int  # J, nodes of the acceleration
+    nodes: int  # J, nodes of the acceleration
     bin: float = BIN  # s
-    knot: float = KNOT  # s between nodes of the acceleration
-    every: int = NODE_ROWS  # rows to a step
+    node_step: float = NODE_STEP  # s between nodes of the acceleration
+    every: int = STEP_ROWS  # rows to a step
 
     @property
     def seconds(self) -> float:
@@ -76,17 +76,17 @@ class SegmentGrid:
     def weights(self) -> np.ndarray:
         """hⱼ(tₖ) = max(0, 1 - |tₖ/Δ - j|) [K, J]: hat functions of the acceleration's nodes, Δ s
         apart, at the instants of the steps."""
-        at = np.arange(self.nodes) * self.step * self.every / self.knot
-        return np.maximum(1.0 - np.abs(at[:, None] - np.arange(self.knots)), 0.0)
+        at = np.arange(self.instants) * self.step * self.every / self.node_step
+        return np.maximum(1.0 - np.abs(at[:, None] - np.arange(self.nodes)), 0.0)
 
 
 def grid(record: Record) -> SegmentGrid:
     """Of a record's rows, in its ship's time scale."""
     of = record.timescale
     rows = round(of.seconds / record.step)
-    bins, knots = round(of.seconds / of.bin), round(of.seconds / of.knot) + 1
-    nodes = rows // of.node_rows + 1
-    return SegmentGrid(record.step, rows, nodes, bins, knots, of.bin, of.knot, of.node_rows)
+    bins, nodes = round(of.seconds / of.bin), round(of.seconds / of.node_step) + 1
+    instants = rows // of.step_rows + 1
+    return SegmentGrid(record.step, rows, instants, bins, nodes, of.bin, of.node_step, of.step_rows)
 
 
 def begins(record: Record) -> np.ndarray:
@@ -101,7 +101,7 @@ def cut(record: Record, rows: np.ndarray) -> Cut:
     """The segments that begin at these rows of a record (as recorded, or put right)."""
     y, used = measured(record, rows)
     driven = driving(record, rows)
-    return Cut(rows, y, used, driven, record.voyage[rows], record.step * record.timescale.node_rows)
+    return Cut(rows, y, used, driven, record.voyage[rows], record.step * record.timescale.step_rows)
 
 
 def measured(record: Record, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -131,16 +131,16 @@ def _in_bins(
 
 
 def driving(record: Record, rows: np.ndarray) -> np.ndarray:
-    """Actuators, share of the campaign and true wind at the steps' nodes [S, K, A + 3]."""
+    """Actuators, share of the campaign and true wind at the steps' instants [S, K, A + 3]."""
     driven = np.concatenate((record.actuator, record.share[:, None], record.true_wind), 1)
-    return at_nodes(record, rows, driven)
+    return at_instants(record, rows, driven)
 
 
-def at_nodes(record: Record, rows: np.ndarray, values: np.ndarray) -> np.ndarray:
+def at_instants(record: Record, rows: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Of a record's rows [n, c] those at the steps' instants [S, K, c], each the mean, by the
     trapezium, of the rows about it: what lies between two instants counts."""
     g = grid(record)
-    at = rows[:, None] + g.every * np.arange(g.nodes)
+    at = rows[:, None] + g.every * np.arange(g.instants)
     firsts, lasts, half = record.firsts[at], record.lasts[at], g.every // 2
     found = np.zeros((*at.shape, values.shape[1]))
     for away in range(-half, half + 1):

@@ -32,11 +32,11 @@ def columns(states, by_state, by_driven, by_theta, moved, hats, step, bins):
     hats      [K, J]        hⱼ(tₖ)
     step      h [s]
     """
-    count, nodes = states.shape[:2]
-    knots, p, q = hats.shape[1], by_theta.shape[3], moved.shape[3]
+    count, instants = states.shape[:2]
+    nodes, p, q = hats.shape[1], by_theta.shape[3], moved.shape[3]
     driving = moved.shape[2]
-    per = (nodes - 1) // bins
-    at_theta = 6 + 3 * knots
+    per = (instants - 1) // bins
+    at_theta = 6 + 3 * nodes
     at_moved = at_theta + p - q
     width = at_theta + p
     out = np.zeros((count, bins, 6, width))
@@ -47,12 +47,12 @@ def columns(states, by_state, by_driven, by_theta, moved, hats, step, bins):
         before[:] = 0.0
         for i in range(6):
             now[i, i] = 1.0
-        for k in range(nodes - 1):
+        for k in range(instants - 1):
             acceleration[:] = 0.0
-            for j in range(knots):
+            for j in range(nodes):
                 if hats[k, j] != 0.0:
                     for c in range(3):
-                        acceleration[c, 6 + c * knots + j] = hats[k, j]
+                        acceleration[c, 6 + c * nodes + j] = hats[k, j]
             for c in range(3):
                 for i in range(p):
                     acceleration[c, at_theta + i] = by_theta[s, k, c, i]

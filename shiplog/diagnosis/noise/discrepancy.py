@@ -26,7 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shiplog.diagnosis.linear import segment_nodes
-from shiplog.diagnosis.linear.segment_nodes import Knots
+from shiplog.diagnosis.linear.segment_nodes import Nodes
 from shiplog.diagnosis.linear.segments import Cut, SegmentGrid
 from shiplog.models.mmg import geometry
 from shiplog.nomenclature import frames
@@ -60,7 +60,7 @@ class Waves:
 
 @dataclass(frozen=True)
 class Family:
-    """One family: `columns` of the discrepancy's weights, and its features at the knots.
+    """One family: `columns` of the discrepancy's weights, and its features at the nodes.
 
     level    [F] subtracted from each feature, and scale [F] by which it is divided, both over the
              campaigns; F with the features of an even force
@@ -73,20 +73,20 @@ class Family:
     scale: np.ndarray
     columns: np.ndarray
 
-    def features(self, knots: Knots) -> np.ndarray:
+    def features(self, nodes: Nodes) -> np.ndarray:
         """I₃ ⊗ φ/√F [S, J, 3, 3F], φ_f = (feature - level)/scale: acceleration of each weight, in
         units of the process noise. Features of the position and of an even force are turned into
         body axes; those of an even force come first, and are not divided by √F."""
-        values = (features(self.name, self.profile, self.waves, knots) - self.level) / self.scale
+        values = (features(self.name, self.profile, self.waves, nodes) - self.level) / self.scale
         plain = EVEN.get(self.name, 0)
         out = segment_nodes.in_each_channel(values[..., plain:] / np.sqrt(values.shape[-1] - plain))
         if self.name == "position":
-            out = _turned(out, knots)
+            out = _turned(out, nodes)
         if not plain:
             return out
         even = segment_nodes.in_each_channel(values[..., :plain])
         even[..., 2, 2 * plain] = 0.0  # a steady moment is the ship's own
-        return np.concatenate((_turned(even, knots), out), -1)
+        return np.concatenate((_turned(even, nodes), out), -1)
 
 
 @dataclass(frozen=True)
@@ -104,11 +104,11 @@ class Discrepancy:
         """Φ [S, 3J, W]: acceleration of each weight at the nodes, channel by channel, m/s² and
         rad/s²; times the factors of the causes that scale a family's forces."""
         if not self.families:
-            return np.zeros((len(cut), 3 * g.knots, 0))
-        knots = segment_nodes.at_knots(cut, g)
+            return np.zeros((len(cut), 3 * g.nodes, 0))
+        nodes = segment_nodes.conditions_at_nodes(cut, g)
         parts = []
         for family in self.families:
-            of = family.features(knots)
+            of = family.features(nodes)
             if family.name in cut.factors:
                 of = of * cut.factors[family.name][:, None]
             parts.append(segment_nodes.accelerations(of, self.acceleration))
@@ -116,7 +116,7 @@ class Discrepancy:
 
 
 def of(
-    profile: Profile, acceleration: np.ndarray, first: int, names: Sequence[str], *campaigns: Knots
+    profile: Profile, acceleration: np.ndarray, first: int, names: Sequence[str], *campaigns: Nodes
 ) -> Discrepancy:
     """The families that these campaigns can show anything of.
 
@@ -129,7 +129,7 @@ def of(
         waves = _waves(name, *campaigns)
         if waves is None:
             continue
-        parts = [features(name, profile, waves, knots) for knots in campaigns]
+        parts = [features(name, profile, waves, nodes) for nodes in campaigns]
         both = np.concatenate([values.reshape(-1, values.shape[-1]) for values in parts])
         # a constant force depends on nothing
         level = both.mean(0) if name in UNSEEN else np.zeros(both.shape[-1])
@@ -143,7 +143,7 @@ def of(
     return Discrepancy(tuple(found), acceleration)
 
 
-def _waves(name: str, *campaigns: Knots) -> Waves | None:
+def _waves(name: str, *campaigns: Nodes) -> Waves | None:
     """√(2/F) cos(z · ω_f + φ_f), z [n] standardised, ω_f ~ N(0, I/max(n/2, 1)), φ_f ~ U(0, 2π)
     (Rahimi & Recht 2007), drawn once a family; of the heading its harmonics, cos kψ and sin kψ.
     None where nothing of the family varies."""
@@ -162,17 +162,17 @@ def _waves(name: str, *campaigns: Knots) -> Waves | None:
     return Waves(z.mean(0), np.where(width > 1e-9, width, 1.0), frequency, phase)
 
 
-def features(name: str, profile: Profile, waves: Waves, knots: Knots) -> np.ndarray:
+def features(name: str, profile: Profile, waves: Waves, nodes: Nodes) -> np.ndarray:
     """Features of a family at the nodes [S, J, F], before level and scale: products of ship
     hydrodynamics, or of an even force, then the smooth ones."""
-    inputs = _inputs(name, knots)
+    inputs = _inputs(name, nodes)
     smooth = waves(inputs)
     if name in UNSEEN:
         return np.concatenate((_even(name, inputs, waves), smooth), -1)
     products = PRODUCTS.get(name)
     if products is None:
         return smooth
-    return np.concatenate((*products(profile, knots), smooth), -1)
+    return np.concatenate((*products(profile, nodes), smooth), -1)
 
 
 def _even(name: str, inputs: np.ndarray, waves: Waves) -> np.ndarray:
@@ -184,10 +184,10 @@ def _even(name: str, inputs: np.ndarray, waves: Waves) -> np.ndarray:
     return np.concatenate((steady, (inputs - waves.middle) / waves.width), -1)
 
 
-def _inputs(name: str, knots: Knots) -> np.ndarray:
+def _inputs(name: str, nodes: Nodes) -> np.ndarray:
     """What a family depends on [S, J, n], SI: (x₀, y₀), ψ, the share of the campaign, (u, v, r),
     actuators and u, or the apparent flow of the air."""
-    state, driven = knots.state, knots.driven
+    state, driven = nodes.state, nodes.driven
     if name == "position":
         return state[..., [0, 2]]
     if name == "heading":
@@ -198,51 +198,51 @@ def _inputs(name: str, knots: Knots) -> np.ndarray:
         return state[..., [1, 3, 5]]
     if name == "controls":
         return np.concatenate((driven[..., :-3], state[..., [1]]), -1)
-    return apparent_flow(knots)
+    return apparent_flow(nodes)
 
 
-def apparent_flow(knots: Knots) -> np.ndarray:
+def apparent_flow(nodes: Nodes) -> np.ndarray:
     """(u_A, v_A) = Rᵀ(ψ) W + (u, v) [..., 2]: where the apparent wind comes from, ahead and to
     starboard, of the true wind W (where that comes from, over the water) [m/s]."""
-    state = knots.state
+    state = nodes.state
     c, s = np.cos(state[..., 4]), np.sin(state[..., 4])
-    ahead, starboard = frames.in_body_axes(knots.driven[..., -2], knots.driven[..., -1], c, s)
+    ahead, starboard = frames.in_body_axes(nodes.driven[..., -2], nodes.driven[..., -1], c, s)
     return np.stack((ahead + state[..., 1], starboard + state[..., 3]), -1)
 
 
-def _of_motion(profile: Profile, knots: Knots) -> list[np.ndarray]:
+def _of_motion(profile: Profile, nodes: Nodes) -> list[np.ndarray]:
     """u, v, r, u|u|, v|v|, r|r|, uv, ur, vr, |u|v, |u|r, |v|r, |r|v (Abkowitz 1964; moduli after
     Fedyaevsky & Sobolev 1964)."""
-    u, v, r = (knots.state[..., [i]] for i in (1, 3, 5))
+    u, v, r = (nodes.state[..., [i]] for i in (1, 3, 5))
     return [
         u, v, r, u * np.abs(u), v * np.abs(v), r * np.abs(r), u * v, u * r, v * r,
         np.abs(u) * v, np.abs(u) * r, np.abs(v) * r, np.abs(r) * v,
     ]  # fmt: skip
 
 
-def _of_controls(profile: Profile, knots: Knots) -> list[np.ndarray]:
+def _of_controls(profile: Profile, nodes: Nodes) -> list[np.ndarray]:
     """n|n| and |n|u of every unit that drives, n in rev/s; of every angle δ
 
         sin δ u|u|,  1 - cos δ,  n|n| sin δ,  n|n| (1 - cos δ)   of each unit of `driven_by`,
         sin(πδ/δ_max) u|u|,  sin(πδ/δ_max) n|n|                  of a rudder,
 
     whose force need not grow with its angle (stall, play, a stop)."""
-    u = knots.state[..., [1]]
+    u = nodes.state[..., [1]]
     driving = [i for i, a in enumerate(profile.actuators) if a.kind in ("propeller", "thruster")]
     found = []
     for i in driving:
-        n = knots.driven[..., [i]]
+        n = nodes.driven[..., [i]]
         found += [n * np.abs(n), np.abs(n) * u]
     for i, actuator in enumerate(profile.actuators):
         if actuator.kind not in ("rudder", "azimuth"):
             continue
-        angle = knots.driven[..., [i]]
+        angle = nodes.driven[..., [i]]
         found += [np.sin(angle) * u * np.abs(u), 1.0 - np.cos(angle)]
         bent = []
         if actuator.kind == "rudder":
             bent = [np.sin(np.pi * angle / hard_over(actuator))]
         for j in driven_by(profile, i, driving):
-            thrust = knots.driven[..., [j]] * np.abs(knots.driven[..., [j]])
+            thrust = nodes.driven[..., [j]] * np.abs(nodes.driven[..., [j]])
             found += [thrust * np.sin(angle), thrust * (1.0 - np.cos(angle))]
             found += [thrust * shape for shape in bent]
         found += [shape * u * np.abs(u) for shape in bent]
@@ -261,22 +261,22 @@ def driven_by(profile: Profile, angle: int, driving: list[int]) -> list[int]:
     return same or driving[:2]
 
 
-def _of_wind(profile: Profile, knots: Knots) -> list[np.ndarray]:
+def _of_wind(profile: Profile, nodes: Nodes) -> list[np.ndarray]:
     """U_A² cos kα and U_A² sin kα, k = 1, 2, 3: harmonics of the apparent wind's angle α."""
-    wind = apparent_flow(knots)
+    wind = apparent_flow(nodes)
     square, angle = (wind**2).sum(-1, keepdims=True), np.arctan2(wind[..., [1]], wind[..., [0]])
     return [square * wave(k * angle) for k in (1, 2, 3) for wave in (np.cos, np.sin)]
 
 
-PRODUCTS: dict[str, Callable[[Profile, Knots], list[np.ndarray]]] = {
+PRODUCTS: dict[str, Callable[[Profile, Nodes], list[np.ndarray]]] = {
     "motion": _of_motion, "controls": _of_controls, "wind": _of_wind,
 }  # fmt: skip
 
 
-def _turned(out: np.ndarray, knots: Knots) -> np.ndarray:
+def _turned(out: np.ndarray, nodes: Nodes) -> np.ndarray:
     """(X, Y) = Rᵀ(ψ) (X₀, Y₀): what pulls towards a place pulls along the earth's axes; turned into
     the body's, in place."""
-    heading = knots.state[..., [4]]
+    heading = nodes.state[..., [4]]
     north, east = out[..., 0, :].copy(), out[..., 1, :].copy()
     out[..., 0, :], out[..., 1, :] = frames.in_body_axes(
         north, east, np.cos(heading), np.sin(heading)

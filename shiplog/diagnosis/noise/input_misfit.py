@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from shiplog.diagnosis.linear import segment_nodes
-from shiplog.diagnosis.linear.segment_nodes import Knots
+from shiplog.diagnosis.linear.segment_nodes import Nodes
 from shiplog.diagnosis.linear.segments import Cut, SegmentGrid
 from shiplog.diagnosis.noise.likelihood import Modes
 from shiplog.machine.jit_cache import double
@@ -43,7 +43,7 @@ class Misfit:
 
     def accelerations(self, cut: Cut, g: SegmentGrid) -> np.ndarray:
         """Φ = φᵀ A_c [S, 3J, W]: acceleration of each weight at the nodes, channel by channel."""
-        waves = _features(self.network, segment_nodes.at_knots(cut, g))
+        waves = _features(self.network, segment_nodes.conditions_at_nodes(cut, g))
         return np.concatenate([waves @ axes for axes in self.axes], axis=1)
 
     def bends(self, weights: np.ndarray) -> np.ndarray:
@@ -65,7 +65,7 @@ def estimate(
     known  K [C], prior information of d, in `unit`s [C]
     acceleration  q [3], unit of size
     """
-    waves = _features(network, segment_nodes.at_knots(cut, g))
+    waves = _features(network, segment_nodes.conditions_at_nodes(cut, g))
     sums = np.linalg.eigh(np.tensordot(waves, waves, ((0, 1), (0, 1))))[1][:, -SUMS:]
     count = sums.shape[1]
     axes = np.zeros((3, len(sums), 3 * count))
@@ -81,11 +81,11 @@ def estimate(
     return Misfit(network, axes @ (size * turned[:, felt > FELT]))
 
 
-def _features(network: Network, knots: Knots) -> np.ndarray:
+def _features(network: Network, nodes: Nodes) -> np.ndarray:
     """φ [S, J, F] of the network at the nodes."""
-    actuator, wind = knots.driven[..., :-3], knots.driven[..., -2:]
+    actuator, wind = nodes.driven[..., :-3], nodes.driven[..., -2:]
     with double():
-        return np.asarray(network.features(*map(jnp.asarray, (knots.state, actuator, wind))))
+        return np.asarray(network.features(*map(jnp.asarray, (nodes.state, actuator, wind))))
 
 
 def _likelihood(total: np.ndarray, known: np.ndarray, size: float) -> float:

@@ -20,7 +20,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from shiplog.diagnosis.linear.linear_segments import Linear
-from shiplog.voyages.rows.timescale import BIN, KNOT
+from shiplog.voyages.rows.timescale import BIN, NODE_STEP
 
 INTERMITTENT_TIME_S = 12.0  # s, of an intermittent force on a three-metre ship: several bins
 
@@ -36,9 +36,9 @@ class ProcessNoise:
     start   [6]  of the initial state, before any data
     intermittent   [3]  acceleration of an intermittent force, of correlation time
                    `intermittent_time` [s]
-    runs    [S, J, J]  of a force that is on or off: 1 where it is on at both knots of a segment, in
+    runs    [S, J, J]  of a force that is on or off: 1 where it is on at both nodes of a segment, in
                    one run, and 0 elsewhere; None where it may act at any time
-    bin, knot    s of one observation, and between the nodes of the acceleration
+    bin, node_step    s of one observation, and between the nodes of the acceleration
     """
 
     noise: np.ndarray
@@ -51,17 +51,17 @@ class ProcessNoise:
     coloured: np.ndarray = field(default_factory=lambda: np.zeros(6))
     fade: np.ndarray = field(default_factory=lambda: np.ones(6))
     bin: float = BIN
-    knot: float = KNOT
+    node_step: float = NODE_STEP
 
-    def kernel(self, knots: int) -> np.ndarray:
+    def kernel(self, nodes: int) -> np.ndarray:
         """Q = diag(q²) ⊗ T(τ) + p pᵀ ⊗ (on ∘ T(τ_p)),  Tᵢⱼ(τ) = exp(-|tᵢ - tⱼ|/τ).
 
-        Covariance [3J, 3J] of the acceleration at J = `knots` nodes, channel by channel; with a
+        Covariance [3J, 3J] of the acceleration at J = `nodes` nodes, channel by channel; with a
         force that is on or off [S, 3J, 3J].
 
         q   `acceleration` [3]   p   `intermittent` [3]   on   `runs` [S, J, J]
         """
-        t = self.knot * np.arange(knots)
+        t = self.node_step * np.arange(nodes)
         Q = np.kron(np.diag(self.acceleration**2), decay(t, self.time))
         if self.intermittent is None:
             return Q
@@ -76,10 +76,10 @@ class ProcessNoise:
         """λ² Q: the same with standard deviations λ q."""
         return replace(self, acceleration=self.acceleration * factor)
 
-    def precision(self, knots: int) -> np.ndarray:
+    def precision(self, nodes: int) -> np.ndarray:
         """P⁻¹ = diag(P₀⁻¹, Q⁻¹) of z [6 + 3J, 6 + 3J]; with a force that is on or off one of each
         segment. Raises np.linalg.LinAlgError where Q is singular."""
-        size, Q_inverse = 6 + 3 * knots, np.linalg.inv(self.kernel(knots))
+        size, Q_inverse = 6 + 3 * nodes, np.linalg.inv(self.kernel(nodes))
         P_inverse = np.zeros((*Q_inverse.shape[:-2], size, size))
         P_inverse[..., :6, :6] = np.diag(self.start**-2.0)
         P_inverse[..., 6:, 6:] = Q_inverse
@@ -139,14 +139,14 @@ class Weighed:
     zd      [S, 6 + 3J, 1 + C]       Zᵀ R⁻¹ E
     zz      [S, 6 + 3J, 6 + 3J]      Zᵀ R⁻¹ Z
     logdet  log|R|, over the observations used
-    knots   J, number of nodes
+    nodes   J, number of nodes
     """
 
     dd: np.ndarray
     zd: np.ndarray
     zz: np.ndarray
     logdet: float
-    knots: int
+    nodes: int
 
 
 def weighed(linear: Linear, process_noise: ProcessNoise) -> Weighed:
@@ -309,7 +309,7 @@ def modes(weighed: Weighed, process_noise: ProcessNoise) -> Modes:
     C⁻¹ = C₀⁻¹ - C₀⁻¹ Zₐ L U diag(1 / (f + λ⁻²)) Uᵀ Lᵀ Zₐᵀ C₀⁻¹ for every factor λ. Raises
     np.linalg.LinAlgError where the path diverged."""
     without_start = startless(weighed, process_noise)
-    L = np.linalg.cholesky(process_noise.kernel(weighed.knots))
+    L = np.linalg.cholesky(process_noise.kernel(weighed.nodes))
     Lt = np.swapaxes(L, -1, -2)
     f, U = np.linalg.eigh(Lt @ without_start.kk @ L)
     Ut = np.swapaxes(U, 1, 2)
@@ -339,7 +339,7 @@ def whitened_posterior(
     return V @ (Zt @ left), V
 
 
-def starts_and_knots(
+def starts_and_accelerations(
     linear: Linear, d: np.ndarray, process_noise: ProcessNoise
 ) -> tuple[np.ndarray, np.ndarray]:
     """z | e, d ~ N(V Zᵀ R⁻¹ (e - J d), V),  V = (Zᵀ R⁻¹ Z + P⁻¹)⁻¹: mean [S, 6 + 3J] and covariance

@@ -51,7 +51,7 @@ def estimate(
     products = _by_channel(linear, left, process_noise)
     counted = np.maximum(linear.cut.used.sum((0, 1)), 1)
     nodes = (linear.z.shape[-1] - 6) // 3
-    T_inverse = np.linalg.inv(decay(process_noise.knot * np.arange(nodes), process_noise.time))
+    T_inverse = np.linalg.inv(decay(process_noise.node_step * np.arange(nodes), process_noise.time))
     least = np.log(np.concatenate((LEAST_NOISE, np.full(3, 1e-12))))
 
     def at(sizes: np.ndarray) -> ProcessNoise:

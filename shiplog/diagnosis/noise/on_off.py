@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import betaln
 
-STRONGEST = 0.95  # quantile of the force's size, since a single knot may be off
+STRONGEST = 0.95  # quantile of the force's size, since a single node may be off
 ON = 0.5  # share of the strongest, above which it is on, before a course is known
 ROUNDS = 10  # of estimating course and sizes in turn, at most
 LEAST_SHARE = 1e-3  # of the large force, that the small one is at least

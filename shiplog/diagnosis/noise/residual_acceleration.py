@@ -15,7 +15,7 @@ import polars as pl
 
 from shiplog.diagnosis.linear import segment_nodes, segments
 from shiplog.diagnosis.linear.linear_segments import Linear
-from shiplog.diagnosis.noise.likelihood import ProcessNoise, starts_and_knots
+from shiplog.diagnosis.noise.likelihood import ProcessNoise, starts_and_accelerations
 from shiplog.voyages.rows.recording import Record
 
 HALF_SEGMENT = 8  # nodes: half a segment
@@ -30,7 +30,7 @@ class Unexplained:
     rows      [S, J]     of the record
     time      [S, J]     s into the voyage
     voyage    [S]        counts in the record's names
-    knot                 s between nodes
+    node_step                 s between nodes
     """
 
     mean: np.ndarray
@@ -38,7 +38,7 @@ class Unexplained:
     rows: np.ndarray
     time: np.ndarray
     voyage: np.ndarray
-    knot: float
+    node_step: float
 
 
 def covering(record: Record) -> np.ndarray:
@@ -50,7 +50,7 @@ def covering(record: Record) -> np.ndarray:
     """
     size = segments.grid(record).rows
     begins = segments.begins(record)
-    between = begins + HALF_SEGMENT * round(record.timescale.knot / record.step)
+    between = begins + HALF_SEGMENT * round(record.timescale.node_step / record.step)
     between = between[between + size <= record.lasts[begins]]
     ends = np.append(np.flatnonzero(record.starts)[1:], len(record)) - 1 - size
     lasts = ends[(ends >= 0) & (record.firsts[np.maximum(ends, 0)] == record.firsts[ends + size])]
@@ -66,17 +66,17 @@ def posterior(
     """
     count, size = len(linear.e), linear.z.shape[-1]
     nodes = (size - 6) // 3
-    z, covariance = starts_and_knots(linear, d, process_noise)
+    z, covariance = starts_and_accelerations(linear, d, process_noise)
     mean = z[:, 6:]
     sd = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)[:, 6:])
-    rows = segment_nodes.rows_at_knots(linear.cut.rows, segments.grid(record))
+    rows = segment_nodes.rows_of_nodes(linear.cut.rows, segments.grid(record))
     return Unexplained(
         mean.reshape(count, 3, nodes),
         sd.reshape(count, 3, nodes),
         rows,
         record.time[rows],
         linear.cut.voyage,
-        record.timescale.knot,
+        record.timescale.node_step,
     )
 
 
@@ -92,7 +92,7 @@ def unique_instants(found: Unexplained) -> np.ndarray:
     keep = np.ones(rows.size, dtype=bool)
     last = order[0]
     for at in order[1:]:
-        if voyage[at] == voyage[last] and time[at] - time[last] < 0.5 * found.knot:
+        if voyage[at] == voyage[last] and time[at] - time[last] < 0.5 * found.node_step:
             worse = at if doubt[at] > doubt[last] else last
             keep[worse] = False
             last = last if worse == at else at
@@ -136,7 +136,7 @@ def table(found: Unexplained, record: Record) -> pl.DataFrame:
 def means_about(record: Record, values: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """x̄ᵢ = Σ_{|k - i| ≤ h} xₖ / (2h + 1): means [m, c] of values [n, c] over the time between two
     nodes, about rows i [m]; over less of it at the ends of a stretch."""
-    half = round(0.5 * record.timescale.knot / record.step)
+    half = round(0.5 * record.timescale.node_step / record.step)
     low = np.maximum(rows - half, record.firsts[rows])
     high = np.minimum(rows + half, record.lasts[rows]) + 1
     centre = values.mean(0)  # a running sum of large numbers would lose small changes

@@ -100,7 +100,7 @@ def nominal_pass(
     anchor = nominal_fit.anchored(start, at.theta, columns)
     families = discrepancy.of(
         record.profile, at.process_noise.acceleration, len(columns.unit), discrepancy.SEEN,
-        segment_nodes.at_knots(linear.cut, g),
+        segment_nodes.conditions_at_nodes(linear.cut, g),
     )  # fmt: skip
     accelerations = families.accelerations(linear.cut, g)
     columns = columns.with_misfit(families.count)

@@ -31,7 +31,9 @@ from shiplog.models.starting_values import Start
 from shiplog.voyages.rows.recording import Record
 
 PROCESS_NOISE = ("noise", "acceleration", "start", "coloured", "fade")
-TIME_FIELDS = ("time", "bin", "knot", "intermittent_time")
+# Field → its name in the file.
+TIME_FIELDS = {"time": "time", "bin": "bin", "node_step": "knot",
+               "intermittent_time": "intermittent_time"}  # fmt: skip
 LIBRARIES = (jax, numba, np, scipy)
 
 log = logging.getLogger(__name__)
@@ -87,11 +89,11 @@ def _read(kept: File) -> dict | None:
 
 def _process_noise(process_noise: ProcessNoise) -> dict:
     whole = {f"process_noise_{name}": getattr(process_noise, name) for name in PROCESS_NOISE}
-    return whole | {name: getattr(process_noise, name) for name in TIME_FIELDS}
+    return whole | {name: getattr(process_noise, field) for field, name in TIME_FIELDS.items()}
 
 
 def _known_process_noise(arrays: dict) -> ProcessNoise:
-    times = {n: float(arrays[n]) for n in TIME_FIELDS}
+    times = {field: float(arrays[name]) for field, name in TIME_FIELDS.items()}
     return ProcessNoise(**times, **{n: arrays[f"process_noise_{n}"] for n in PROCESS_NOISE})
 
 

@@ -129,7 +129,7 @@ def learn(
     )
     unseen = discrepancy.of(
         record.profile, at.process_noise.acceleration, len(columns.unit), discrepancy.UNSEEN,
-        segment_nodes.at_knots(made.linear.cut, segments.grid(record)),
+        segment_nodes.conditions_at_nodes(made.linear.cut, segments.grid(record)),
     )  # fmt: skip
     whole = modes.joined(unseen.accelerations(made.linear.cut, segments.grid(record)))
     unit = np.append(columns.unit, np.ones(unseen.count))

@@ -163,12 +163,12 @@ class _Campaign:
         cut, moved, observed = read(model, setting, record, segments.begins(record))
         begin = ProcessNoise(
             wide.noise, FIRST_NOISE * wide.acceleration, PROCESS_NOISE_TIME_S * of.factor,
-            wide.start, bin=of.bin, knot=of.knot,
+            wide.start, bin=of.bin, node_step=of.node_step,
             intermittent_time=likelihood.INTERMITTENT_TIME_S * of.factor,
         )  # fmt: skip
         found = discrepancy.of(
             record.profile, begin.acceleration, columns.linearised, seen,
-            segment_nodes.at_knots(cut, grid),
+            segment_nodes.conditions_at_nodes(cut, grid),
         )  # fmt: skip
         return cls(
             model, start, cut, moved, observed, grid, wide, columns.with_misfit(found.count),

@@ -91,9 +91,9 @@ def find_omitted_inputs(trial: Trial, nothing: Fit, whole: Linear) -> tuple[Depe
         trial.process_noise(nothing.remainder, whole.cut).times(nothing.found.noise_factor),
         trial.record,
     )  # fmt: skip
-    knots = residual_acceleration.table(found, trial.record)
+    nodes = residual_acceleration.table(found, trial.record)
     return omitted_inputs.table(
-        knots, trial.record.profile, np.random.default_rng(0), knot=trial.grid.knot
+        nodes, trial.record.profile, np.random.default_rng(0), node_step=trial.grid.node_step
     )
 
 

@@ -167,7 +167,7 @@ def balance(
     loose = replace(
         process_noise, acceleration=np.maximum(process_noise.acceleration, LOOSE * reach)
     )
-    rows, acceleration, sd = _knots(residual_acceleration.posterior(linear, d, loose, record))
+    rows, acceleration, sd = _nodes_of(residual_acceleration.posterior(linear, d, loose, record))
     F = acceleration @ M.T
     sd_F = np.sqrt(sd**2 @ M.T**2)
     spread = 1.4826 * np.median(np.abs(F), axis=0)
@@ -262,7 +262,9 @@ def _resting(record: Record, physics: MMG, rows: np.ndarray) -> np.ndarray:
     power = (np.abs(record.actuator[:, drives]) / np.maximum(most, 1e-9)).max(1)
     turned = np.concatenate(([0], np.cumsum(power > STILL)))
     before = np.maximum(rows - round(JETS_GONE_S / record.step), record.firsts[rows])
-    after = np.minimum(rows + round(0.5 * record.timescale.knot / record.step), record.lasts[rows])
+    after = np.minimum(
+        rows + round(0.5 * record.timescale.node_step / record.step), record.lasts[rows]
+    )
     return turned[after + 1] == turned[before]
 
 
@@ -287,7 +289,7 @@ def _contradicted(record: Record, rows: np.ndarray) -> np.ndarray:
     return near[high + 1] > near[low]
 
 
-def _knots(found: Unexplained) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _nodes_of(found: Unexplained) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Rows [K] in order, means and standard deviations [K, 3], each instant once."""
     keep = residual_acceleration.unique_instants(found)
     order = np.argsort(found.rows[keep])
@@ -298,7 +300,7 @@ def _knots(found: Unexplained) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def _unbroken(record: Record, rows: np.ndarray) -> Iterator[slice]:
     """Nodes that follow each other."""
     apart = (np.diff(record.firsts[rows]) != 0) | (
-        np.diff(record.time[rows]) > 1.5 * record.timescale.knot
+        np.diff(record.time[rows]) > 1.5 * record.timescale.node_step
     )
     ends = [0, *(np.flatnonzero(apart) + 1).tolist(), len(rows)]
     yield from (slice(a, b) for a, b in itertools.pairwise(ends))

@@ -27,7 +27,7 @@ import polars as pl
 from shiplog.diagnosis.noise.residual_acceleration import ACCELERATIONS
 from shiplog.nomenclature import channels
 from shiplog.ship_profile.profile import Profile
-from shiplog.voyages.rows.timescale import KNOT
+from shiplog.voyages.rows.timescale import NODE_STEP
 
 CHANNELS = tuple(c.name for c in channels.VELOCITY)
 LEAST_R2 = 0.05  # of the variance: what a model misfits itself reaches half of it in another season
@@ -81,35 +81,35 @@ Indices = np.ndarray  # [K] which node's unseen variable goes with each node
 
 
 def table(
-    knots: pl.DataFrame,
+    nodes: pl.DataFrame,
     profile: Profile,
     rng: np.random.Generator,
     shifts: int = SHIFTS,
-    knot: float = KNOT,
+    node_step: float = NODE_STEP,
 ) -> tuple[Dependence, ...]:
     """R² of each channel: one row each for heading, position, time and controls.
 
-    knots   nodes of `residual_acceleration.table`, or the same columns of any other model's
+    nodes   nodes of `residual_acceleration.table`, or the same columns of any other model's
             residual
     rng     draws the shifts
-    knot    s between nodes
+    node_step    s between nodes
 
     R² is beyond what a regression on the model's inputs predicts; that of position also beyond
     heading, or every steady force would count as a matter of place.
     """
-    shared, folds = _nodes(knots, profile)
-    psi = knots["heading"].to_numpy()
+    shared, folds = _nodes(nodes, profile)
+    psi = nodes["heading"].to_numpy()
     heading = _heading(psi, shared.carried)
     designs: dict[str, tuple[Callable[[Indices], np.ndarray], np.ndarray]] = {
         "heading": (heading, shared.visible),
         "position": (
-            _position(knots.select("x0", "y0").to_numpy(), psi),
+            _position(nodes.select("x0", "y0").to_numpy(), psi),
             np.concatenate((shared.visible, heading(np.arange(len(psi)))), 1),
         ),
-        "time": (_time(knots["share"].to_numpy(), shared.carried), shared.visible),
-        "controls": (_controls(knots, profile, shared, knot), shared.visible),
+        "time": (_time(nodes["share"].to_numpy(), shared.carried), shared.visible),
+        "controls": (_controls(nodes, profile, shared, node_step), shared.visible),
     }
-    time = knots["time_s"].to_numpy()
+    time = nodes["time_s"].to_numpy()
     found = []
     for variable, (features, known) in designs.items():
         move = _exchanged if variable == "time" else _shifted
@@ -130,17 +130,17 @@ def _three(values: np.ndarray) -> tuple[float, float, float]:
     return float(values[0]), float(values[1]), float(values[2])
 
 
-def _nodes(knots: pl.DataFrame, profile: Profile) -> tuple[_Nodes, str]:
+def _nodes(nodes: pl.DataFrame, profile: Profile) -> tuple[_Nodes, str]:
     """y, X₀ = (u, v, r, u|u|, v|v|, r|r|, uv, ur, vr, wind, drive), what carries a missing effect
     (1, u, v, r, drive), and the folds with their name. y is cut at OUTLIER robust deviations."""
-    y = knots.select(ACCELERATIONS).to_numpy()
+    y = nodes.select(ACCELERATIONS).to_numpy()
     middle = np.median(y, axis=0)
     reach = OUTLIER * 1.4826 * np.median(np.abs(y - middle), axis=0)
-    runs = knots["voyage"].rle_id().to_numpy().astype(int)
-    motion = _unit(knots.select(CHANNELS).to_numpy())
-    blown = knots.select("wind_ahead", "wind_starboard").to_numpy()
+    runs = nodes["voyage"].rle_id().to_numpy().astype(int)
+    motion = _unit(nodes.select(CHANNELS).to_numpy())
+    blown = nodes.select("wind_ahead", "wind_starboard").to_numpy()
     blown = _unit(blown * np.linalg.norm(blown, axis=1, keepdims=True))
-    drive = _drive(knots, profile)
+    drive = _drive(nodes, profile)
     u, v, r = motion.T
     visible = np.concatenate(
         (motion, motion * np.abs(motion), np.stack((u * v, u * r, v * r), 1), blown, drive), 1
@@ -150,17 +150,17 @@ def _nodes(knots: pl.DataFrame, profile: Profile) -> tuple[_Nodes, str]:
     return _Nodes(np.clip(y, middle - reach, middle + reach), visible, carried, runs, folds), name
 
 
-def _drive(knots: pl.DataFrame, profile: Profile) -> np.ndarray:
+def _drive(nodes: pl.DataFrame, profile: Profile) -> np.ndarray:
     """(nᵢ|nᵢ|)ᵢ, (Σ n|n|) sin δⱼ, (Σ n|n|) cos δⱼ [K, D]: thrust of each screw, over its root mean
     square, and all of it turned by each angle."""
-    values = {a.name: knots[a.name].to_numpy() for a in profile.actuators}
+    values = {a.name: nodes[a.name].to_numpy() for a in profile.actuators}
     strengths = [
         values[a.name] * np.abs(values[a.name])
         for a in profile.actuators
         if a.kind in ("propeller", "thruster")
     ]
     angles = [values[a.name] for a in profile.actuators if a.kind in ("rudder", "azimuth")]
-    strength = _unit(np.stack(strengths or [np.ones(knots.height)], 1))
+    strength = _unit(np.stack(strengths or [np.ones(nodes.height)], 1))
     total = strength.sum(1)
     turned = [total * turn(angle) for angle in angles for turn in (np.sin, np.cos)]
     return np.concatenate((strength, np.stack(turned, 1) if turned else strength[:, :0]), 1)
@@ -226,13 +226,13 @@ def _time(share: np.ndarray, carried: np.ndarray) -> Callable[[Indices], np.ndar
 
 
 def _controls(
-    knots: pl.DataFrame, profile: Profile, shared: _Nodes, knot: float
+    nodes: pl.DataFrame, profile: Profile, shared: _Nodes, node_step: float
 ) -> Callable[[Indices], np.ndarray]:
     """Δu_i times what carries the effect: what each actuator did since the node before; nothing
     where a stretch begins."""
-    values = knots.select(profile.actuator_names).to_numpy()
-    step = np.diff(knots["time_s"].to_numpy(), prepend=-np.inf)
-    follows = (np.diff(shared.runs, prepend=-1) == 0) & (step < 1.5 * knot)
+    values = nodes.select(profile.actuator_names).to_numpy()
+    step = np.diff(nodes["time_s"].to_numpy(), prepend=-np.inf)
+    follows = (np.diff(shared.runs, prepend=-1) == 0) & (step < 1.5 * node_step)
     change = _unit(np.where(follows[:, None], np.diff(values, axis=0, prepend=values[:1]), 0.0))
     return lambda at: _times(change[at], shared.carried)
 

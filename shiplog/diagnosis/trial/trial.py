@@ -66,10 +66,10 @@ class Trial:
         """All segments of a record with weight 1; `cache` is a new one where none is handed in."""
         grid, rows = segments.grid(record), segments.begins(record)
         reference = campaign.reference
-        knots = segment_nodes.at_knots(segments.cut(record, rows), grid)
+        nodes = segment_nodes.conditions_at_nodes(segments.cut(record, rows), grid)
         known = len(reference.columns.unit)
         unseen = discrepancy.of(
-            record.profile, reference.process_noise.acceleration, known, discrepancy.UNSEEN, knots
+            record.profile, reference.process_noise.acceleration, known, discrepancy.UNSEEN, nodes
         )
         # as long as those from which the campaign knows how far parts differ
         longest = max((len(part) for part in campaign.rows), default=PART)
@@ -126,7 +126,7 @@ class Trial:
     def process_noise(self, remainder: Remainder, cut: segments.Cut | None = None) -> ProcessNoise:
         """The nominal one; with an intermittent force in it, where one remains. Of the trial's own
         segments, or of others."""
-        rows = segment_nodes.rows_at_knots(self.rows if cut is None else cut.rows, self.grid)
+        rows = segment_nodes.rows_of_nodes(self.rows if cut is None else cut.rows, self.grid)
         return remainder.in_noise(self.reference.process_noise, rows)
 
     def at(

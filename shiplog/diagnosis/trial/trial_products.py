@@ -49,7 +49,7 @@ class Products:
         """Modes of the process noise at a point, and the factor λ to divide them by (2). One pass
         serves every λ, but that of an intermittent force together with the process noise, whose
         axes turn with it."""
-        rows = segment_nodes.rows_at_knots(point.linear.cut.rows, self.grid)
+        rows = segment_nodes.rows_of_nodes(point.linear.cut.rows, self.grid)
         process_noise = remainder.in_noise(self.campaign.reference.process_noise, rows)
         shape, left = remainder.shape, noise_factor
         if process_noise.intermittent is not None:

@@ -67,7 +67,7 @@ def _measured(record: Record) -> pl.DataFrame:
 
 
 def _residual(done: Diagnosis) -> tuple[pl.DataFrame, tuple[str, ...]]:
-    """Unexplained and named force at the knots, and what the latter is of."""
+    """Unexplained and named force at the nodes, and what the latter is of."""
     assert done.simulated is not None and done.whole is not None
     (trial, decision), whole = done.simulated, done.whole
     ref, record = trial.reference, trial.record
@@ -118,10 +118,10 @@ def _caused(trial: Trial, decision: Decision, rows: np.ndarray) -> np.ndarray:
         state, driven, wind = (
             means_about(was, v, rows) for v in (was.state, driven, was.true_wind)
         )
-        # by as many as a segment has knots: that shape is compiled already
-        blocks = -(-len(rows) // trial.grid.knots)
+        # by as many as a segment has nodes: that shape is compiled already
+        blocks = -(-len(rows) // trial.grid.nodes)
         state, driven = (
-            np.resize(values, (blocks, trial.grid.knots, values.shape[1]))
+            np.resize(values, (blocks, trial.grid.nodes, values.shape[1]))
             for values in (state, np.concatenate((driven, wind), 1))
         )
         found = linearisation.accelerations(ref.model, theta, state, driven)
@@ -131,11 +131,11 @@ def _caused(trial: Trial, decision: Decision, rows: np.ndarray) -> np.ndarray:
 
 
 def _side_force(trial: Trial, decision: Decision) -> np.ndarray:
-    """Force [n, 3] of the thruster that nobody records, at rows that are knots."""
+    """Force [n, 3] of the thruster that nobody records, at rows that are nodes."""
     assert decision.side_force is not None
     force, _ = intermittent.force_at_nodes(trial, decision.fit, decision.side_force)
     whole = np.full(len(trial.record), np.nan)
-    whole[segment_nodes.rows_at_knots(trial.rows, trial.grid)] = force
+    whole[segment_nodes.rows_of_nodes(trial.rows, trial.grid)] = force
     return whole[:, None] * np.array([0.0, 1.0, decision.side_force.lever])
 
 

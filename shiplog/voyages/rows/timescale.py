@@ -1,6 +1,6 @@
 """How long a ship's segments are, in units of its own time: the length over the speed, L/U.
 
-A segment is about 4 L/U (T' = U t/L, e.g. Yasukawa & Yoshimura 2015); bins and knots are a
+A segment is about 4 L/U (T' = U t/L, e.g. Yasukawa & Yoshimura 2015); bins and nodes are a
 fifteenth of that.
 """
 
@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 SEGMENT_S = 30.0
 BIN = 2.0  # s that one observation averages
-KNOT = 2.0  # s between knots of the acceleration
-NODE_ROWS = 2  # rows of the record to a step of an integration
+NODE_STEP = 2.0  # s between nodes of the acceleration
+STEP_ROWS = 2  # rows of the record to a step of an integration
 SEGMENT_BINS = 15  # of a segment, whatever it lasts
 SHIP_TIME = 7.1  # s, L/U for which the above are made: 5 to 10 s, of 3 m at 0.3 to 0.6 m/s
 BIN_LENGTHS = (1.4, 2.0, 4.0, 8.0, 16.0)  # s; segments of 21 to 240 s, rows to a bin are even
@@ -23,16 +23,16 @@ CAMPAIGN_SEGMENTS = (
 
 @dataclass(frozen=True)
 class Timescale:
-    """How long a ship's segments are [s], what one observation averages, and between knots."""
+    """How long a ship's segments are [s], what one observation averages, and between nodes."""
 
     seconds: float = SEGMENT_S
     bin: float = BIN
-    knot: float = KNOT
+    node_step: float = NODE_STEP
 
     @property
-    def node_rows(self) -> int:
+    def step_rows(self) -> int:
         """Rows of the record to a step of an integration, of which a bin has a whole number."""
-        return NODE_ROWS * max(int(self.factor), 1)
+        return STEP_ROWS * max(int(self.factor), 1)
 
     @property
     def factor(self) -> float:
