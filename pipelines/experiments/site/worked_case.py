@@ -38,7 +38,7 @@ def sizes(search: Search) -> str:
     rows = [
         ("segments S", len(trial.rows)),
         ("seconds of a segment", grid.seconds),
-        ("s of a bin; between nodes", f"{noise.bin:g}; {noise.knot:g}"),
+        ("s of a bin; between nodes", f"{noise.bin:g}; {noise.node_step:g}"),
         ("numbers of the nominal reference", len(trial.reference.pull)),
         ("columns of J in all", len(columns.unit)),
         ("share of itself that the trial counts", f"{trial.reference.counts:.3g}"),
@@ -77,7 +77,7 @@ def weighed(search: Search) -> str:
 def _row(search: Search, one: Hypothesis, share: float) -> tuple[object, ...]:
     table = search.table
     misfit = sum(table.placebo.get(n, 0.0) for n in (*one.causes, one.kind))
-    prior = table.priors.of(one.causes, one.kind)
+    prior = table.priors.hypothesis(one.causes, one.kind)
     allowance = one.evidence + prior - misfit - one.score
     return (
         " + ".join(one.causes) or "none", one.kind,
