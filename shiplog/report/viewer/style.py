@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
@@ -47,6 +48,16 @@ def faded(colour: Colour, share: float = 0.35) -> Colour:
         round(share * c + (1.0 - share) * p) for c, p in zip(colour[:3], PAPER[:3], strict=True)
     )
     return (red, green, blue, 255)
+
+
+def instants(seconds: np.ndarray) -> rr.TimeColumn:
+    """Seconds [n] as the recording's time, to the nearest nanosecond.
+
+    Rerun 0.41 cuts what is below a nanosecond off an array of seconds: one instant of forty at
+    10 Hz is then 1 ns early, and is no instant of what was logged by another call.
+    """
+    whole = np.rint(np.asarray(seconds, np.float64) * 1e9).astype("timedelta64[ns]")
+    return rr.TimeColumn(TIMELINE, duration=whole)
 
 
 def entity(*parts: str) -> str:

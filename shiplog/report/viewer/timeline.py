@@ -239,7 +239,7 @@ def _send_window_starts(
     )
     recording.send_columns(
         path,
-        indexes=[rr.TimeColumn(style.TIMELINE, duration=time)],
+        indexes=[style.instants(time)],
         columns=rr.Scalars.columns(scalars=np.zeros(len(time))),
     )
 
@@ -274,6 +274,6 @@ def send_lines(
     columns = rr.Scalars.columns(scalars=values.ravel())
     recording.send_columns(
         path,
-        indexes=[rr.TimeColumn(style.TIMELINE, duration=time)],
+        indexes=[style.instants(time)],
         columns=columns.partition([count] * len(time)) if count > 1 else columns,
     )

@@ -211,7 +211,7 @@ def _send_moving_hull(
     time = display.column(rows, "time")[valid]
     recording.send_columns(  # from the first instant on: before it a hull would lie at the origin
         path,
-        indexes=[rr.TimeColumn(style.TIMELINE, duration=time[:1])],
+        indexes=[style.instants(time[:1])],
         columns=rr.LineStrips2D.columns(
             strips=list(hulls(NORTHWARD, outline(drawn))),
             colors=[colour],
@@ -221,7 +221,7 @@ def _send_moving_hull(
     )
     recording.send_columns(
         path,
-        indexes=[rr.TimeColumn(style.TIMELINE, duration=time)],
+        indexes=[style.instants(time)],
         columns=rr.Transform3D.columns(
             translation=points[valid],
             quaternion=np.column_stack((zero, zero, np.sin(half), np.cos(half))),
