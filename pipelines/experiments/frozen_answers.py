@@ -112,9 +112,13 @@ def compare(before: Path, after: Path, equal: float = EQUAL) -> str:
 
 
 def files_compared(before: Path, after: Path) -> str:
-    """The files of stores and runs that differ in any bit."""
+    """The files of stores and runs that differ in any bit, but for when and by what they were
+    made. The answers at the top are the table's."""
     old, new = same_numbers.content(before), same_numbers.content(after)
-    kept = [name for name in old if name.split("/")[0] not in ("reports", "logs")]
+    kept = [
+        name for name in old
+        if "/" in name and not name.startswith("reports/") and not name.endswith("provenance.json")
+    ]  # fmt: skip
     differ = [name for name in kept if not _same(name, old[name], new.get(name))]
     return "\n".join((f"{len(kept)} files of stores and runs: {len(differ)} differ", *differ))
 
