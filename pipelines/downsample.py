@@ -19,7 +19,7 @@ from pathlib import Path
 
 import polars as pl
 
-from pipelines import stage
+from pipelines.stage import stage
 from shiplog.machine import files
 from shiplog.machine.paths import check_there, refuse_taken
 from shiplog.ship_profile.profile import Profile

@@ -18,8 +18,8 @@ from pathlib import Path
 
 import polars as pl
 
-from pipelines import stage
 from pipelines.downsample import rows, ship
+from pipelines.stage import stage
 from pipelines.windows import planned
 from shiplog.commands import train_networks
 from shiplog.training.runs.load_model import Run

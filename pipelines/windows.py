@@ -17,8 +17,8 @@ from pathlib import Path
 
 import polars as pl
 
-from pipelines import stage
 from pipelines.downsample import rows
+from pipelines.stage import stage
 from shiplog.machine import files
 from shiplog.machine.paths import check_there, refuse_taken
 from shiplog.voyages.windows.augmentation import AUGMENTATIONS

@@ -40,6 +40,8 @@ import json, os, sys
 cores, commands = json.loads(sys.argv[1])
 os.sched_setaffinity(0, cores)
 from shiplog import cli
+from shiplog.cli import process
+process.one_thread()
 sys.exit(max(cli.run(command) for command in commands))
 """
 

@@ -40,7 +40,7 @@ def main(parts: object = None) -> None:
     """Entry point: settings of this process, then `run`."""
     _open_missing()
     disk_cache.keep_compiled()
-    os.environ["NPROC"] = ONE_THREAD
+    one_thread()
     logging.basicConfig(format="%(message)s", handlers=[_Lines()], level=logging.WARNING)
     logging.getLogger("shiplog").setLevel(logging.INFO)
     for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
@@ -48,6 +48,11 @@ def main(parts: object = None) -> None:
             signal.signal(number, _stopped)
     ended = guard.guarded(sys.argv[1:])  # in the child there is none: it runs the command
     sys.exit(run(parts=parts) if ended is None else ended)
+
+
+def one_thread() -> None:
+    """XLA of this process: the same numbers on every number of cores."""
+    os.environ["NPROC"] = ONE_THREAD
 
 
 def _open_missing() -> None:

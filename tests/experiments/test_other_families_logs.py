@@ -202,5 +202,5 @@ def test_shipmmg_missing_is_reported(monkeypatch):
 
 def test_experiments_are_not_installed():
     project = tomllib.loads((FOLDER.parents[2] / "pyproject.toml").read_text(encoding="utf-8"))
-    assert "pipelines.experiments*" in project["tool"]["setuptools"]["packages"]["find"]["exclude"]
+    assert project["tool"]["setuptools"]["packages"]["find"] == {"include": ["shiplog*"]}
     assert project["project"]["optional-dependencies"]["experiments"] == ["shipmmg"]

@@ -9,6 +9,15 @@ from test_validation_scores import answer, key, named, ranked, undecided
 from pipelines.experiments.hidden_effects import score_tables, scores
 from pipelines.experiments.hidden_effects.open_answers import open_answers
 from shiplog.report.diagnosis import verdict_sentence
+from shiplog.report.diagnosis.sections.ranking import Ranked
+from shiplog.report.diagnosis.sections.structure import Structure
+
+POSITION = Structure("position", (), ("x0", "y0"), 0.0)
+
+
+def rows_of(ranking):
+    """As the program has them, and not its JSON."""
+    return [Ranked(**one) for one in ranking]
 
 
 def said(sentence, **shares):
@@ -63,7 +72,7 @@ def test_the_sentences_of_the_program_are_read(why):
     shares = dict.fromkeys(either or ("side_thrust",), 0.5)
     ranking = ranked(**shares, unknown_position=0.5)
     text = verdict_sentence.sentence(
-        "undecided", (), {"family": "position"}, None, 1.0, ranking=ranking, either=either,
+        "undecided", (), POSITION, None, 1.0, ranking=rows_of(ranking), either=either,
         why=reasons[why],
     )  # fmt: skip
     verdict = {"verdict": "undecided", "ranking": ranking, "sentence": text}
@@ -78,7 +87,7 @@ def test_the_plain_sentences_of_the_program_are_read():
 
     def read(**shares):
         ranking = ranked(**shares)
-        text = verdict_sentence.sentence("undecided", (), None, None, 1.0, ranking=ranking)
+        text = verdict_sentence.sentence("undecided", (), None, None, 1.0, ranking=rows_of(ranking))
         return open_answers({"verdict": "undecided", "ranking": ranking, "sentence": text})
 
     assert read(none=0.6, clock_offset=0.2, unknown_time=0.1, bank=0.05) == (
