@@ -1,4 +1,4 @@
-"""The commands, a file each: `shiplog COMMAND`. They call `shiplog.commands`, as `import shiplog` does.
+"""The commands, a file each: `shiplog COMMAND`. Like `import shiplog` they call `shiplog.commands`.
 
 What is heavy is imported where it is used, after the arguments were checked: a wrong word is
 answered at once.
