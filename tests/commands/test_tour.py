@@ -11,6 +11,8 @@ import shiplog
 from shiplog.diagnosis.hypotheses import search
 from shiplog.exceptions import ShiplogError
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).parents[2]
 # Name in the notebook → sample log. A diagnosis takes as long as its nominal campaign is: 500 s of
 # the same season stand for the 1800 s of voyage_2.
