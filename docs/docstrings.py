@@ -1,7 +1,7 @@
 """Of the site: equations and tables of arguments in docstrings keep their lines.
 
-A docstring is text. In Markdown a paragraph of equations, or of names with what they are beside
-them, would flow into one line: such paragraphs become code.
+A docstring is text. In Markdown a paragraph of equations, or of names each followed by what it is,
+would flow into one line: such paragraphs become code.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import re
 
 import griffe
 
-BESIDE = re.compile(r"\S {3,}\S")  # a column beside another one
+BESIDE = re.compile(r"\S {3,}\S")  # a column next to another one
 EQUATION = re.compile(r"^[^.]{0,60}? = .*[^.:]$")
 
 

@@ -4,10 +4,9 @@
         [--data sli10] [--size 100] [--recipe fast] [--seeds 1] [--width 256] [--epochs N]
         [--ray ADDRESS]
 
-SECONDS is what `pipelines.downsample` wrote, WINDOWS what `pipelines.windows` did. Each seed is a
-task, on a core of this machine or of a Ray cluster. One that was interrupted goes on where it
-stopped. The run is the one that `shiplog train` gives, which `evaluate`, `compare` and `diagnose`
-take.
+SECONDS and WINDOWS are what `pipelines.downsample` and `pipelines.windows` wrote. Each seed is a
+task, on a core of this machine or of a Ray cluster; interrupted, it goes on where it stopped. The
+run is the one that `shiplog train` gives, which `evaluate`, `compare` and `diagnose` take.
 """
 
 from __future__ import annotations
@@ -22,6 +21,7 @@ from pipelines.downsample import rows, ship
 from pipelines.stage import stage
 from pipelines.windows import planned
 from shiplog.commands import train_networks
+from shiplog.exceptions import UsageError, listed
 from shiplog.training.runs.load_model import Run
 from shiplog.training.runs.network_seeds import tasks_of
 from shiplog.training.runs.run_checks import refuse_unended
@@ -36,13 +36,15 @@ def train(
     options.check()
     split = Split(training=options.voyages, validation=options.validation, chosen_by="the user")
     voyages = (*split.training, *split.validation)
-    table = rows(seconds).filter(pl.col("voyage").is_in(voyages))
-    chosen = planned(windows, options.data, split.training)
+    table = rows(seconds)
     hashes = json.loads((seconds / "logs.json").read_text(encoding="utf-8"))
-    known = {name: hashes.get(name) for name in voyages}
+    if absent := sorted({*voyages} - {*table["voyage"]}):
+        raise UsageError(f"{seconds} has no row of {listed(absent)}.", f"It has {listed(hashes)}.")
     begun = train_networks.begin_with(
-        options.config(split), ship(seconds), table, out, planned=chosen, hashes=known
-    )
+        options.config(split), ship(seconds), table.filter(pl.col("voyage").is_in(voyages)), out,
+        planned=planned(windows, options.data, split.training),
+        hashes={name: hashes[name] for name in voyages},
+    )  # fmt: skip
     tasks = tasks_of(begun.run)
     if ray is None:
         failures = train_networks.do(tasks)

@@ -1,5 +1,5 @@
 """The reference of the profile format, from the code that reads profiles: docs/reference/profile.md
-and, beside it, units.md.
+and units.md in the same folder.
 
 python -m pipelines.experiments.profile_reference --markdown docs/reference/profile.md
 """

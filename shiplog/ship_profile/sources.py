@@ -92,7 +92,7 @@ class Source(Section):
         "frame_id, or the name of a publisher; the most frequent one where left out"
     )  # fmt: skip
     status: Literal["heed", "ignore"] = Field(
-        default="heed", description='whether a field beside the values that says "no fix" or "not '
+        default="heed", description='whether a field next to the values that says "no fix" or "not '
         'valid", as status, fix_type or valid, makes them blank'
     )  # fmt: skip
 

@@ -78,6 +78,14 @@ def test_what_is_missing_or_taken_is_one_sentence(folders, tmp_path):
     assert not (tmp_path / "windows").exists()
 
 
+def test_a_voyage_that_is_not_there_is_named(folders, tmp_path):
+    folder, _ = folders
+    options = TrainOptions(voyages=("a",), validation=("c",), window=20)
+    with pytest.raises(ShiplogError, match=r"has no row of c\.\n  It has a, b\."):
+        train(folder / "seconds", folder / "windows", tmp_path / "run", options)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_stage_is_read_on_one_screen():
     for name in ("downsample", "windows", "train"):
         assert len((ROOT / "pipelines" / f"{name}.py").read_text().splitlines()) < 80

@@ -26,7 +26,10 @@ def main() -> int:
     parser.add_argument("--out", type=Path, required=True, help="logs, stores, runs, reports")
     parser.add_argument("--only", nargs="+", choices=DATA_SETS, default=list(DATA_SETS))
     parser.add_argument(
-        "--markdown", type=Path, metavar="PATH", help="write the table there, the ships beside it"
+        "--markdown",
+        type=Path,
+        metavar="PATH",
+        help="write the table there, the ships in its folder",
     )
     given = parser.parse_args()
     logging.basicConfig(format="%(message)s", level=logging.INFO)

@@ -82,7 +82,7 @@ def answers(ways: Sequence[Way]) -> str:
 
 
 def write(path: Path, ways: Sequence[Way]) -> None:
-    """The table, and the pages of ships beside it."""
+    """The table, and the pages of ships in its folder."""
     path.write_text(text(ways), encoding="utf-8")
     for name, (title, of) in PAGES.items():
         there = path.with_name(f"{name}.md")

@@ -22,5 +22,5 @@ About that path and θ*, with the simulated means y*, what is simulated and what
 θ [C] holds the model's P coefficients, then each cause's numbers (`parameter_layout.Columns`). A
 discrepancy with weights w [W] accelerates the ship by Φ_s w at the nodes (`segment_nodes`); with
 Z_s = (Z₀ | Zₐ) by start and accelerations it adds the term Zₐ Φ_s w. In a shape, J is the number
-of nodes; J_s, or J beside e, is the matrix of sensitivities.
+of nodes; J_s, or J where e has no index, is the matrix of sensitivities.
 """

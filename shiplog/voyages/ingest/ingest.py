@@ -53,9 +53,9 @@ def build(reading: Reading, profile: Profile, sent: Mapping[str, Senders] | None
     sent  by topic, those who send on it, where there are several
     """
     sampled = sampling.sampled(reading, profile, sent or {})
-    reading = replace(reading, frames={})  # half of a long log's memory, with the samples
+    reading = replace(reading, frames={})  # as large as the table: gone before the next needs room
     aligned = alignment.aligned(sampled)
-    del sampled
+    del sampled  # likewise
     table = aligned.table
     compared = _compared(aligned, profile)
     usable_s, windows = usable(table, profile)
