@@ -34,14 +34,14 @@ ROOMS = {
     ),
     "training": ("settings", "network", "physics", "runs"),
     "diagnosis": ("linear", "noise", "nominal", "trial", "hypotheses", "verdict", "residual"),
-    "report": ("evaluation", "viewer", "diagnosis", "paper"),
+    "report": ("evaluation", "figures", "viewer", "diagnosis", "paper", "page"),
 }  # fmt: skip
 LEVEL = {name: level for level, name in enumerate(ROWS)}
 SOURCES = sorted((ROOT / "shiplog").rglob("*.py"))
 ONLY = {  # a library, and the packages and modules that may import it
     "mcap": {"logs"}, "mcap_protobuf": {"logs"}, "mcap_ros2": {"logs"}, "pynmea2": {"logs"},
     "rosbags": {"logs"}, "rerun": {"logs", "report"}, "ray": {"training"},
-    "matplotlib": {"report"}, "typer": {"cli"}, "pickle": set(),
+    "matplotlib": {"report"}, "jinja2": {"report"}, "typer": {"cli"}, "pickle": set(),
     "torch": {"training", "shiplog.models.feedforward"},
 }  # fmt: skip
 
