@@ -17,6 +17,7 @@ from shiplog.cli import (
     ingest,
     paper,
     profile,
+    report,
     train,
     voyages,
 )
@@ -33,6 +34,7 @@ COMMANDS = (
     evaluate.evaluate,
     compare.compare,
     diagnose.diagnose,
+    report.report,
     cache.cache,
 )
 

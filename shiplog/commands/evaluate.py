@@ -110,6 +110,28 @@ def save(evaluation: Evaluation) -> tuple[ShiplogError, ...]:
     return tuple(refused)
 
 
+def keep_pages(evaluation: Evaluation, store: Store, page: Path | None) -> tuple[ShiplogError, ...]:
+    """What `shiplog report RUN` makes its page of, in the folder of a run that was evaluated alone;
+    and the page, where one is asked for. Returns what could not be written."""
+    from shiplog.report.page import html
+    from shiplog.report.page.evaluation import page as evaluation_page
+    from shiplog.report.page.evaluation import source as sources
+
+    refused = []
+    source = sources.of_evaluation(evaluation, store)
+    if len(evaluation.runs) == 1:
+        try:
+            sources.save(source, evaluation.runs[0].path / sources.FOLDER)
+        except OSError as error:
+            refused.append(unexpected(error))
+    if page is not None:
+        try:
+            html.write(evaluation_page.of_source(source), page)
+        except ShiplogError as error:
+            refused.append(error)
+    return tuple(refused)
+
+
 def comparison(evaluation: Evaluation, title: str) -> ComparisonData:
     """What the viewer shows of an evaluation."""
     run = evaluation.runs[0]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +12,7 @@ from shiplog.exceptions import listed
 from shiplog.nomenclature.channels import STATE
 from shiplog.report.diagnosis import diagnosis_pictures
 from shiplog.report.diagnosis.diagnosis import Diagnosis
-from shiplog.report.figures import voyage_tables
+from shiplog.report.figures import picture_data, voyage_tables
 from shiplog.report.figures.picture_data import (
     AFTER,
     BEFORE,
@@ -50,7 +49,7 @@ def of_diagnosis(
         conditions=voyage_tables.conditions(run, rows, profile),
     )
     if exhibit is None:
-        return _as_schemas(data, {})
+        return picture_data.typed(data)
     models = {BEFORE: run.name}
     if done.after is not None:
         models[AFTER] = f"{run.name}, {EXTENDED}"
@@ -59,17 +58,7 @@ def of_diagnosis(
         "models": models, "named": exhibit.named, "errors": _errors(exhibit),
         "residual": exhibit.residual, "tracks": _tracks(exhibit, cut), "band": _band(run, cut),
     }  # fmt: skip
-    return _as_schemas(data, found)
-
-
-def _as_schemas(data: PictureData, found: Mapping) -> PictureData:
-    """With every table in the types of its schema."""
-    data = replace(data, **found)
-    tables = {
-        name: getattr(data, name).select(pl.col(k).cast(v) for k, v in schema.items())
-        for name, schema in SCHEMAS.items()
-    }
-    return replace(data, **tables)
+    return picture_data.typed(replace(data, **found))
 
 
 def _named_current(done: Diagnosis) -> tuple[float, float] | None:

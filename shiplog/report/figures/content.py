@@ -32,7 +32,8 @@ class Picture:
     draw     those rows onto the axes
     words    what a reader who cannot see it is to know: kinds of lines, the numbers that matter
     voyage   whether it is of one voyage: there is one for each
-    height   inches, and `by_row` more for each row of the table
+    height   inches, and `by_row` more for each row of the table; of a column `rows_of`, for each
+             of its values
     """
 
     title: str
@@ -42,8 +43,10 @@ class Picture:
     voyage: bool = False
     height: float = style.HEIGHT
     by_row: float = 0.0
+    rows_of: str = ""
     polar: bool = False
 
     def tall(self, table: pl.DataFrame) -> float:
         """Inches, for these rows."""
-        return self.height + self.by_row * len(table)
+        rows = table[self.rows_of].n_unique() if self.rows_of else len(table)
+        return self.height + self.by_row * rows

@@ -108,6 +108,15 @@ class PictureData:
         return self.voyages["voyage"].to_list()
 
 
+def typed(data: PictureData) -> PictureData:
+    """The same, every table with the columns and types of its schema."""
+    tables = {
+        name: getattr(data, name).select(pl.col(k).cast(v) for k, v in schema.items())
+        for name, schema in SCHEMAS.items()
+    }
+    return replace(data, **tables)
+
+
 def save(data: PictureData, folder: Path) -> None:
     """Tables as Parquet and the rest as JSON, into FOLDER."""
     folder.mkdir(parents=True, exist_ok=True)

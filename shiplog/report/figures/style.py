@@ -60,7 +60,11 @@ def svg(figure: Figure, prefix: str) -> str:
     made = io.StringIO()
     with matplotlib.rc_context(RULES):
         figure.savefig(made, format="svg", metadata={"Date": None, "Creator": None})
-    text = made.getvalue()
+    return inline(made.getvalue(), prefix)
+
+
+def inline(text: str, prefix: str) -> str:
+    """A file of matplotlib's as such an element."""
     text = text[text.index("<svg") :]
     text = re.sub(r"\s*<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     text = re.sub(r'\bid="', f'id="{prefix}-', text)

@@ -66,11 +66,11 @@ def _true_wind(rows: pl.DataFrame) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-def conditions(run: Run, rows: pl.DataFrame, profile: Profile) -> pl.DataFrame:
+def conditions(run: Run | None, rows: pl.DataFrame, profile: Profile) -> pl.DataFrame:
     """Of training and trial; of a model that was trained on nothing, of the trial alone."""
     parts = [_condition(TRIAL, rows, profile)]
     try:
-        trained = None if run.given else run.training()
+        trained = None if run is None or run.given else run.training()
     except ShiplogError:
         trained = None
     if trained is not None and len(trained):

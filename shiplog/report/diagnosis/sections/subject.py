@@ -69,6 +69,8 @@ def dates(starts: Sequence[str]) -> str:
     days = sorted(start[:10] for start in starts)
     if not days:
         return ""
+    if days[0].startswith("1970"):  # seconds of a recorder that knows no date
+        return "without a date"
     return days[0] if days[0] == days[-1] else f"{days[0]} to {days[-1]}"
 
 

@@ -51,9 +51,9 @@ def claim(source: Source) -> str:
         first = " or ".join(spoken(one["name"]) for one in verdict["ranking"][:3])
         return f"{on}, these data cannot decide what the simulation by {run} misses: {first}."
     if word == "unknown" and (structure := verdict.get("structure")):
-        on_what = listed(c.replace("_", " ") for c in structure["acts_on"])
-        acts = f" It acts on {on_what}." if structure["acts_on"] else ""
-        return f"{on}, something acts that no known cause explains.{acts}"
+        on_what = " and ".join(c.replace("_", " ") for c in structure["acts_on"])
+        acts = f" on {on_what}" if structure["acts_on"] else ""
+        return f"{on}, something acts{acts} that no known cause explains."
     if word == "coverage":
         return f"{on}, {run} is outside its training data, so nothing can be said of the ship."
     if word == "external":

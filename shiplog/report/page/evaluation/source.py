@@ -18,7 +18,7 @@ from shiplog.nomenclature.contract import CONTRACT
 from shiplog.report.evaluation.evaluation import Evaluation
 from shiplog.report.figures import picture_data, voyage_tables
 from shiplog.report.figures.content import Content
-from shiplog.report.figures.picture_data import MEASURED, SCHEMAS, PictureData
+from shiplog.report.figures.picture_data import MEASURED, PictureData
 from shiplog.report.viewer.comparison_data import BAND
 from shiplog.report.viewer.display import drawn_seeds
 from shiplog.training.runs.load_model import Run
@@ -139,18 +139,16 @@ def _pictures(found: Evaluation, voyages: pl.DataFrame) -> PictureData:
         "conditions": voyage_tables.conditions(run, found.rows, profile),
         "band": _band(drawn.filter(pl.col("run") == run.name)),
     }  # fmt: skip
-    tables = {
-        name: table.select(pl.col(k).cast(v) for k, v in SCHEMAS[name].items())
-        for name, table in data.items()
-    }
-    return PictureData(
-        title=f"{profile.ship.name}: {listed(found.voyages, most=3)}",
-        length=profile.ship.length_m,
-        breadth=profile.ship.breadth,
-        outline=tuple(profile.ship.outline or ()),
-        banks=tuple(tuple((x, y) for x, y in bank) for bank in profile.site.banks),
-        models={name: name for name in names},
-        **tables,
+    return picture_data.typed(
+        PictureData(
+            title=f"{profile.ship.name}: {listed(found.voyages, most=3)}",
+            length=profile.ship.length_m,
+            breadth=profile.ship.breadth,
+            outline=tuple(profile.ship.outline or ()),
+            banks=tuple(tuple((x, y) for x, y in bank) for bank in profile.site.banks),
+            models={name: name for name in names},
+            **data,
+        )
     )
 
 
