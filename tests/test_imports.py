@@ -34,7 +34,7 @@ ROOMS = {
     ),
     "training": ("settings", "network", "physics", "runs"),
     "diagnosis": ("linear", "noise", "nominal", "trial", "hypotheses", "verdict", "residual"),
-    "report": ("evaluation", "figures", "viewer", "diagnosis", "paper", "page"),
+    "report": ("evaluation", "figures", "viewer", "diagnosis", "paper", "page", "gate"),
 }  # fmt: skip
 LEVEL = {name: level for level, name in enumerate(ROWS)}
 SOURCES = sorted((ROOT / "shiplog").rglob("*.py"))
