@@ -75,6 +75,9 @@ def text(
     if verdict is not None:
         allowed = [word for word in VERDICTS if word in ("none", verdict.verdict)]
         lines += ["", "[diagnosis]", f"allowed = {json.dumps(allowed)}  # today: {verdict.verdict}"]
+        if verdict.causes:
+            named = json.dumps([_label(one) for one in verdict.causes], ensure_ascii=False)
+            lines.append(f"causes_allowed = {named}")
         if sizes := _sizes(verdict, own, windless):
             lines += ["", "[sizes]", *sizes]
     return "\n".join(map(one_line, lines)) + "\n"

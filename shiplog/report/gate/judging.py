@@ -78,6 +78,8 @@ def of_verdict(
     lines = []
     if limits.diagnosis.allowed:
         lines.append(verdict_limits.of_verdict(limits.diagnosis.allowed, found))
+    if limits.diagnosis.causes_allowed is not None:
+        lines.append(verdict_limits.of_named(limits.diagnosis.causes_allowed, found))
     lines += [
         verdict_limits.of_cause(label, found) for label in limits.diagnosis.causes_not_allowed or ()
     ]

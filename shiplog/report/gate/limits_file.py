@@ -51,12 +51,13 @@ Band = create_model("Band", __base__=Strict, **_optional({c.name: Share for c in
 
 
 class Diagnosis(Strict):
-    """[diagnosis]: allowed verdicts, and causes that must not be named."""
+    """[diagnosis]: allowed verdicts, the only causes that may be named, and those that must not."""
 
     allowed: Annotated[
         tuple[Literal["named", "none", "unknown", "undecided", "coverage", "external"], ...] | None,
         Field(min_length=1, strict=False),
     ] = None
+    causes_allowed: Annotated[tuple[str, ...] | None, Field(strict=False)] = None
     causes_not_allowed: Names | None = None
 
 
@@ -67,7 +68,7 @@ class Limits(Strict):
     simulation  means over all windows, key → limit
     voyages     of each voyage that a name or shell pattern fits, key → limit
     band        channel → share inside the 90 % band, at least
-    diagnosis   allowed verdicts, and causes that must not be named
+    diagnosis   allowed verdicts and causes
     sizes       cause → parameter → its largest size, in the catalogue's unit
     """
 
@@ -134,7 +135,8 @@ def check_names(
     """
     units = tuple(actuators)
     try:
-        for name in limits.diagnosis.causes_not_allowed or ():
+        of = limits.diagnosis
+        for name in (*(of.causes_allowed or ()), *(of.causes_not_allowed or ())):
             check_cause(name, causes, units)
         for name, sizes in limits.sizes.items():
             for parameter in sizes:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from shiplog.models.causes import Cause
 from shiplog.nomenclature.numbers import figure
 from shiplog.report.gate.cause_names import SEARCHED, SIDE_THRUST, neutral, parted, unit_of
-from shiplog.report.gate.diagnosed import Detectable, Diagnosed, Named
+from shiplog.report.gate.diagnosed import Detectable, Diagnosed, Named, fits
 from shiplog.report.gate.outcome import Measured, Outcome, of_number
 
 OPEN = ("undecided", "coverage")  # verdicts that decide nothing
@@ -29,6 +29,22 @@ def of_verdict(allowed: Sequence[str], found: Diagnosed) -> Outcome:
     return Outcome(
         "diagnosis", "allowed", "verdict", "allowed", tuple(allowed), "",
         Measured(words=word, reason=reason), state,
+    )  # fmt: skip
+
+
+def of_named(allowed: Sequence[str], found: Diagnosed) -> Outcome:
+    """Whether no other causes are named than those allowed. Where nothing is decided, nothing is
+    named either, and that was not assessed."""
+    other = [one for one in found.causes if not any(fits(a, one.name, one.part) for a in allowed)]
+    words = ", ".join(f"{c.name}:{c.part}" if c.part else c.name for c in found.causes) or "none"
+    state, reason = "holds", ""
+    if other:
+        state, reason = "broken", other[0].sentence
+    elif why := _open(found):
+        state, reason = "not assessed", why
+    return Outcome(
+        "diagnosis", "causes_allowed", "named causes", "allowed", tuple(allowed) or ("none",), "",
+        Measured(words=words, reason=reason), state,
     )  # fmt: skip
 
 
