@@ -68,7 +68,7 @@ def test_its_counts_are_the_text_s(tmp_path):
     suite = suite_of(junit.of_gate(done), tmp_path)
     assert suite.failures + suite.errors == len(done.broken) == 5
     assert done.headline == (
-        "mmg on a, b, 8 windows of 100 s: of 6 limits 5 are broken, 2 of them because they were "
+        "mmg on a, b, 8 windows of 100 s: 5 of 6 limits are broken, 2 of them because they were "
         "not assessed."
     )
     assert done.json["holds"] is False and len(done.json["limits"]) == 6

@@ -83,7 +83,7 @@ def test_each_voyage_that_a_name_or_a_pattern_fits():
         "voyages.a.loss": (2.5, "holds"), "voyages.a.covered": (0.5, "broken"),
         "voyages.b.loss": (6.5, "holds"), "voyages.b.covered": (0.5, "broken"),
     }  # fmt: skip
-    assert found["voyages.b.loss"].line.startswith("holds  b: L: 6.5")
+    assert found["voyages.b.loss"].line.startswith("holds  b, L: 6.5")
 
 
 def test_a_part_of_a_voyage_is_no_pattern():
@@ -120,7 +120,7 @@ def test_without_a_window_nothing_is_assessed():
 def test_a_voyage_without_a_window_is_not_assessed():
     found = lines("[voyages.short]\nloss = 9", evaluation(1.0), names=("a", "b", "short"))
     assert found["voyages.short.loss"].line == (
-        "not assessed short: L, at most 9: short has no 100 s without a gap"
+        "not assessed short, L, at most 9: short has no 100 s without a gap"
     )
 
 

@@ -56,10 +56,10 @@ class Gate(Printed):
         if not bad:
             return f"{of}: {_all(count)}."
         lost = sum(one.state == "not assessed" for one in self.broken)
-        text = f"{of}: of {counted(count, 'limit')} {_were(bad)} broken"
-        return f"{text}, {lost} of them because {_were(lost, 'it')} not assessed." if lost else (
-            f"{text}."
-        )  # fmt: skip
+        text = f"{of}: {_broken(bad, count)}"
+        if lost:
+            text += f", {lost} of them because {_it(lost)} not assessed"
+        return f"{text}."
 
     @property
     def lines(self) -> Sequence[str]:
@@ -84,7 +84,11 @@ def _all(count: int) -> str:
     return "the limit holds" if count == 1 else f"all {count} limits hold"
 
 
-def _were(count: int, one: str = "1") -> str:
-    if one == "it":
-        return "it was" if count == 1 else "they were"
-    return f"{count} is" if count == 1 else f"{count} are"
+def _it(count: int) -> str:
+    return "it was" if count == 1 else "they were"
+
+
+def _broken(bad: int, count: int) -> str:
+    if count == 1:
+        return "the limit is broken"
+    return f"{bad} of {count} limits {'is' if bad == 1 else 'are'} broken"

@@ -39,7 +39,7 @@ def of_windows(
             scored = None if found is None else Scored.of(found, name)
             why = lacking or f"{name} has no {limits.window_s} s without a gap"
             lines += _of_scored(
-                f"voyages.{name}", f"{name}: ", limits.window_s, given(section), scored, why
+                f"voyages.{name}", f"{name}, ", limits.window_s, given(section), scored, why
             )
     wanted = given(limits.band)
     for channel in STATE:
