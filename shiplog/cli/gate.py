@@ -58,8 +58,10 @@ def gate(
 
     with loading():
         from shiplog.commands.gate import gate_command, write_limits
+        from shiplog.report.gate.limits_file import refuse_replaced
     from shiplog.voyages.store.store import Store
 
+    refuse_replaced(limits, junit=junit, json=None if json_to in (None, "-") else Path(json_to))
     if write:
         answer(
             write_limits(

@@ -105,6 +105,14 @@ def test_what_is_not_there(desk, store, tmp_path):
     assert call("gate", desk.run, "--store", store)[0] == 2  # without limits
 
 
+def test_no_output_replaces_the_limits(desk, tmp_path):
+    for option in ("--junit", "--json"):
+        code, _, error = desk.gate(WIDE, option, tmp_path / "limits.toml")
+        assert code == 1 and "would replace the limits" in error
+        assert (tmp_path / "limits.toml").read_text("utf-8") == WIDE
+    assert desk.gate(WIDE, "--json", "-")[0] == 0
+
+
 # ---------------------------------------------------------------- diagnoses
 
 

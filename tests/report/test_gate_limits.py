@@ -1,9 +1,11 @@
 """limits.toml: what can stand in it, and in which words what cannot is refused."""
 
 import pytest
+from own_causes import GOOD
 
+from shiplog.models.causes import user
 from shiplog.nomenclature.channels import STATE
-from shiplog.report.gate import limits_file
+from shiplog.report.gate import cause_names, limits_file
 from shiplog.report.gate.limits_file import LimitsError, given, parse
 
 WHOLE = """
@@ -63,7 +65,9 @@ def test_channels_of_the_band_are_those_of_the_state():
         ("[simulation]\nlos = 3", "simulation.los is not a known key (did you mean 'loss'?)"),
         ("[voyages.one]\nend_m = 3", "voyages.one.end_m is not a known key"),
         ("[voyages]\none = 3", "voyages.one has to be a section"),
-        ("loss = 3", "loss is not a known key"),
+        ("loss = 3", "loss belongs into the section [simulation]"),
+        ("[simulation]\nsway = 0.8", "simulation.sway belongs into the section [band]"),
+        ("los = 3", "los is not a known key (known: band, diagnosis, simulation,"),
         ("[simulation]\nloss = 0", "simulation.loss has to be above 0"),
         ("[simulation]\nloss = -1", "simulation.loss has to be above 0"),
         ("[simulation]\nloss = '3'", "simulation.loss has to be a number"),
@@ -109,6 +113,18 @@ def test_a_cause_or_a_number_that_there_is_not(text, words):
     with pytest.raises(LimitsError) as raised:
         limits_file.check_names(limits, "my.toml", (), ("port", "starboard"))
     assert words in raised.value.message and raised.value.hint
+
+
+def test_a_cause_of_the_user_s_own_is_known_by_its_file(tmp_path):
+    (tmp_path / "mine.py").write_text(GOOD, encoding="utf-8")
+    own = user.load([tmp_path / "mine.py"])
+    name, number = own[0].name, own[0].parameters[0]
+    limits = parse(f"[sizes]\n{name}.{number.name} = 1", "my.toml")
+    limits_file.check_names(limits, "my.toml", own, ())
+    assert cause_names.unit_of(name, number.name, own) == number.unit
+    with pytest.raises(LimitsError) as raised:
+        limits_file.check_names(limits, "my.toml", (), ())
+    assert name in raised.value.message and "--cause" in raised.value.hint
 
 
 def test_limits_of_another_window():

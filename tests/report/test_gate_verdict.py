@@ -146,10 +146,23 @@ def test_a_size_that_was_not_found_holds_where_a_larger_one_would_have_shown():
     assert of_size("clock_offset:gnss", "time", 0.5, found()).state == "holds"
 
 
+def test_a_limit_on_every_channel_needs_each_of_them():
+    """One is named, and small enough; of the other, 0.9 s might have stayed hidden."""
+    named = found("named", causes=[LATE])
+    one = of_size("clock_offset", "time", 0.5, named)
+    assert one.line == (
+        "not assessed clock_offset.time, at most 0.5 s: not found of wind, and only 0.9 s or more "
+        "could have shown"
+    )
+    assert of_size("clock_offset", "time", 0.35, named).state == "broken"
+    assert of_size("clock_offset", "time", 1.0, named).state == "holds"
+    assert of_size("clock_offset:gnss", "time", 0.5, named).state == "holds"
+
+
 def test_a_number_that_could_not_show_is_not_assessed():
     limits = [{"name": "payload", "share": 0.3, "parameters": {}}]
     one = of_size("payload", "mass", 9.0, found("none", limits=limits))
-    assert one.line.endswith("no realistic mass of it could have shown")
+    assert one.line.endswith("no realistic mass could have shown")
     assert of_size("bank", "strength", 9.0, found()).state == "not assessed"
     offset = {"name": "rudder_offset", "parameters": {"port": FOULED["parameters"]["factor"]}}
     other = of_size("rudder_offset", "prot", 9.0, found("named", causes=[offset]))

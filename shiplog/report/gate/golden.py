@@ -32,6 +32,7 @@ BAND_MARGIN = 0.1  # of the share inside the 90 % band: as far from it as all sa
 COVERED_MARGIN = 0.1  # of the share that is covered, where it has no interval
 TIE = 1e-9  # of a count of steps: what is whole but for rounding stays
 BARE = re.compile(r"[A-Za-z0-9_-]+")
+LEAST_SHARE = 0.05  # a lower limit below it would limit nothing
 REALISTIC = 1.0  # share of its realistic size, up to which a smallest detectable one is listed
 
 
@@ -105,7 +106,7 @@ def _share_line(key: str, measured: Measured, margin: float) -> list[str]:
     if value is None:
         return [f"# {key}: {measured.reason}"]
     low = value - margin if measured.low is None else value - MARGIN * (value - measured.low)
-    if low < 0.01:
+    if low < LEAST_SHARE:
         return [f"# {key}: today {_told(measured)}, too little for a limit"]
     return [f"{key} = {_rounded(low, up=False)}  # today: {_told(measured)}"]
 

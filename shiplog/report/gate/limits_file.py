@@ -167,6 +167,15 @@ def refuse_other_voyages(source: str, patterns: Iterable[str], names: Sequence[s
         )
 
 
+def refuse_replaced(path: Path, **outputs: Path | None) -> None:
+    """Raises LimitsError where an output would replace the limits. outputs: option → file."""
+    for option, other in outputs.items():
+        if other is not None and other.exists() and path.exists() and path.samefile(other):
+            raise LimitsError(
+                f"--{option} {other} would replace the limits.", hint="give it another file."
+            )
+
+
 def _text(path: Path) -> str:
     if not path.is_file():
         what = "is a folder, not a file" if path.is_dir() else "does not exist"
@@ -189,8 +198,11 @@ def _faults(error: ValidationError) -> list[str]:
     for item in error.errors():
         place = ".".join(map(str, item["loc"])) or "it"
         if item["type"] == "extra_forbidden":
-            known = _keys_at(item["loc"][:-1])
-            close = nearest(str(item["loc"][-1]), known)
+            key, known = str(item["loc"][-1]), _keys_at(item["loc"][:-1])
+            if section := _section_of(key, item["loc"][:-1]):
+                found.append(f"{place} belongs into the section [{section}]")
+                continue
+            close = nearest(key, known)
             found.append(f"{place} is not a known key{close or f' (known: {listed(known)})'}")
         elif item["type"] == "literal_error":
             found.append(
@@ -202,7 +214,7 @@ def _faults(error: ValidationError) -> list[str]:
         elif item["type"] == "greater_than":
             found.append(f"{place} has to be above 0")
         elif item["type"] in ("model_type", "dict_type"):
-            found.append(f"{place} has to be a section")
+            found.append(f"{place} has to be a section of keys")
         elif item["type"] == "tuple_type":
             found.append(f"{place} has to be a list of texts")
         elif item["type"] == "too_short":
@@ -218,3 +230,11 @@ def _keys_at(location: tuple) -> list[str]:
         return list(Limits.model_fields)
     section = {"band": Band, "diagnosis": Diagnosis}.get(str(location[0]), Simulation)
     return list(section.model_fields)
+
+
+def _section_of(key: str, location: tuple) -> str:
+    """The section that a key belongs into, which stands elsewhere; empty for an unknown one."""
+    sections = {"simulation": Simulation, "band": Band, "diagnosis": Diagnosis}
+    return next(
+        (n for n, one in sections.items() if key in one.model_fields and (n,) != location), ""
+    )

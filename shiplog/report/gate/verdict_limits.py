@@ -6,7 +6,7 @@ where its smallest detectable size is not above the limit: a larger one would ha
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from shiplog.models.causes import Cause
 from shiplog.nomenclature.numbers import figure
@@ -77,6 +77,9 @@ def of_size(
     at = neutral(label, parameter, own, windless)
     if present := [*found.named(label), *found.traced(label)]:
         measured = _largest([size_of(one, parameter, at) for one in present])
+        why = _not_shown(label, parameter, limit, unit, found, {one.part for one in present})
+        if why and measured.high is not None and measured.high <= limit:
+            measured = Measured(reason=why)
     else:
         measured = _not_named(label, parameter, limit, unit, found)
     key = f"{label}.{parameter}"
@@ -104,18 +107,33 @@ def _largest(each: Sequence[Measured]) -> Measured:
 
 
 def _not_named(label: str, parameter: str, limit: float, unit: str, found: Diagnosed) -> Measured:
-    if why := found.not_excluded(label):
+    why = found.not_excluded(label) or _not_shown(label, parameter, limit, unit, found)
+    if why:
         return Measured(reason=why)
-    least = 0.0
+    least = max(detectable_size(one, parameter) or 0.0 for one in found.detectable(label))
+    return Measured(least, words=f"not found (detectable from {_told(least, unit)})")
+
+
+def _not_shown(
+    label: str, parameter: str, limit: float, unit: str, found: Diagnosed,
+    named: Collection[str] = (),
+) -> str:  # fmt: skip
+    """Why a size above the limit might not have shown, of a channel or unit of the cause that is
+    not among those `named`; empty where it would have."""
     for one in found.detectable(label):
+        if one.part in named:
+            continue
+        of = f" of {one.part}" if one.part and one.part not in label else ""
         size = detectable_size(one, parameter)
         if size is None:
-            return Measured(reason=f"no realistic {parameter} of it could have shown")
-        least = max(least, size)
-    told = f"{figure(least, 3)} {unit}".rstrip()
-    if least > limit:
-        return Measured(reason=f"not found, and only {told} or more could have shown")
-    return Measured(least, words=f"not found (detectable from {told})")
+            return f"no realistic {parameter}{of} could have shown"
+        if size > limit:
+            return f"not found{of}, and only {_told(size, unit)} or more could have shown"
+    return ""
+
+
+def _told(size: float, unit: str) -> str:
+    return f"{figure(size, 3)} {unit}".rstrip()
 
 
 def detectable_size(one: Detectable, parameter: str) -> float | None:
