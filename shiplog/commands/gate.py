@@ -60,7 +60,7 @@ class Judged:
         trial = sum(e.seconds for e in self.store.entries() if e.name in self.names)
         minutes = _expected_s(self.run, trial) / 60.0
         log.info(
-            "limits on a verdict need a diagnosis of %s: about %.0f min%s.",
+            "limits on a verdict need a diagnosis of %s: up to %.0f min%s.",
             listed(self.names, most=4), max(minutes, 1.0),
             "" if self.folder else "; --diagnosis FOLDER keeps it, or gives one that is there",
         )  # fmt: skip
