@@ -164,6 +164,19 @@ def test_a_diagnosis_of_another_log_of_that_name(desk):
     assert code == 1 and "of another log trip_3 than the one in the store" in error
 
 
+def test_names_in_a_stranger_s_folder_are_inert(desk):
+    kept = desk.diagnosis(run="\x1b[2J<b>")
+    code, _, error = desk.gate(VERDICT, "--diagnosis", kept, "--junit", desk.path / "g.xml")
+    assert code == 1 and error.replace("\n", "").isprintable() and "<b>" in error
+    JUnitXml.fromfile(str(desk.path / "g.xml"))
+    (kept / "provenance.json").write_text(json.dumps({"logs_sha256": {"\x1b[2J\n": "0"}}))
+    content = json.loads((kept / "verdict.json").read_text())
+    content["base"]["run"] = "published"
+    (kept / "verdict.json").write_text(json.dumps(content))
+    code, _, error = desk.gate(VERDICT, "--diagnosis", kept)
+    assert code == 1 and error.replace("\n", "").isprintable() and len(error.splitlines()) == 2
+
+
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [("verdict.json", None, "there is no verdict.json in it"),

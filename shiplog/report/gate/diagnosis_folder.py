@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from shiplog.exceptions import RunError, listed
 from shiplog.nomenclature.contract import CONTRACT
+from shiplog.report.evaluation.text_table import one_line
 from shiplog.report.gate import diagnosed
 from shiplog.report.gate.diagnosed import Diagnosed
 from shiplog.training.runs.run_folder import RunFolder
@@ -52,7 +53,7 @@ def load(path: Path) -> DiagnosisFolder:
     try:
         verdict = diagnosed.of(content)
     except ValidationError as error:
-        place = ".".join(map(str, error.errors()[0]["loc"]))
+        place = one_line(".".join(map(str, error.errors()[0]["loc"])))
         raise RunError(
             f"{path / 'verdict.json'} is no answer of `shiplog diagnose`: see its {place}.",
             hint=AGAIN + ".",
@@ -83,7 +84,7 @@ def check(folder: DiagnosisFolder, run: RunFolder, names: Sequence[str],
         )
     if set(folder.logs) != set(names):
         raise RunError(
-            f"{path} is a diagnosis of {listed(folder.logs)}, and the gate is to judge "
+            f"{path} is a diagnosis of {one_line(listed(folder.logs))}, and the gate is to judge "
             f"{listed(names)}.",
             hint="choose the same voyages with --voyages, or leave it out: the gate then judges "
             "those of the diagnosis.",

@@ -12,6 +12,7 @@ from pydantic import ConfigDict, Field, ValidationError, create_model
 from shiplog.exceptions import ShiplogError, listed, nearest
 from shiplog.models.causes import Cause
 from shiplog.nomenclature.channels import STATE, WINDOW
+from shiplog.report.evaluation.text_table import one_line
 from shiplog.report.gate.cause_names import check_cause, check_size
 from shiplog.report.gate.window_limits import KINDS
 from shiplog.ship_profile.file import MESSAGES
@@ -107,7 +108,7 @@ def parse(text: str, source: str) -> Limits:
     """As `load`. `source`: what messages call the text."""
     try:
         limits = Limits.model_validate(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise LimitsError(
             f"{source} is no TOML: {error}.", hint=f"mend that line; {HELP}."
         ) from error
@@ -161,8 +162,8 @@ def refuse_other_voyages(source: str, patterns: Iterable[str], names: Sequence[s
     if patterns := list(patterns):
         several = "sections" if len(patterns) > 1 else "a section"
         raise LimitsError(
-            f"{source} has {several} [voyages] of {listed(patterns)}, and the tested voyages are "
-            f"{listed(names)}{nearest(patterns[0], names)}.",
+            f"{source} has {several} [voyages] of {one_line(listed(patterns))}, and the tested "
+            f"voyages are {listed(names)}{nearest(patterns[0], names)}.",
             hint="correct the name, or choose that voyage with --voyages.",
         )
 
@@ -177,10 +178,9 @@ def refuse_replaced(path: Path, **outputs: Path | None) -> None:
 
 
 def _text(path: Path) -> str:
-    if not path.is_file():
-        what = "is a folder, not a file" if path.is_dir() else "does not exist"
+    if path.is_dir() or not path.exists():  # it may be a pipe
         raise LimitsError(
-            f"The limits {path}: it {what}." if path.is_dir() else f"{path} {what}.",
+            f"{path} is a folder, not a file." if path.is_dir() else f"{path} does not exist.",
             hint="give --limits a TOML file, or write one from today's results with --write.",
         )
     try:
@@ -222,7 +222,7 @@ def _faults(error: ValidationError) -> list[str]:
         else:
             words = item["msg"].replace("Input should be", "has to be")
             found.append(f"{place} {MESSAGES.get(item['type'], words)}")
-    return list(dict.fromkeys(found))
+    return [one_line(one) for one in dict.fromkeys(found)]
 
 
 def _keys_at(location: tuple) -> list[str]:
