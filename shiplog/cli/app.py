@@ -14,6 +14,7 @@ from shiplog.cli import (
     demo,
     diagnose,
     evaluate,
+    gate,
     ingest,
     paper,
     profile,
@@ -35,6 +36,7 @@ COMMANDS = (
     compare.compare,
     diagnose.diagnose,
     report.report,
+    gate.gate,
     cache.cache,
 )
 
@@ -46,7 +48,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Learn a ship's dynamic model from its logs, and see where it fails.",
     epilog="Exit codes: 0 done; 1 the input is at fault; 2 wrong usage; 3 done, but something was "
-    "lost or refused.",
+    "lost or refused; 4 a limit of `gate` is broken.",
 )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
 
@@ -13,6 +14,7 @@ from shiplog.exceptions import listed
 from shiplog.report.diagnosis.sections.subject import dates
 from shiplog.report.figures import changes, style
 from shiplog.report.figures.bars import size_in_words, spoken
+from shiplog.report.figures.content import Content
 from shiplog.report.page.blocks import (
     Answers,
     Block,
@@ -30,6 +32,7 @@ from shiplog.report.page.blocks import (
 )
 from shiplog.report.page.comparison.alike import Item, differences
 from shiplog.report.page.diagnosis.page import WORDS
+from shiplog.report.page.evaluation.page import gallery
 from shiplog.simulation import error_reduction
 
 MOST_LIMITS = 30  # rows of the table of smallest sizes
@@ -211,7 +214,24 @@ def _errors(items: Sequence[Item]) -> list[Block]:
                 _or_diverged(answer["end_heading_deg"], "deg"), _change(base, _losses(item, name)),
             ))  # fmt: skip
     head = ("model", "L", "position at the end", "heading at the end", "L over the first's")
-    return [Grid(head, rows, head[1:4])]
+    names = ("position_error", "heading_error", "windows")
+    return [Grid(head, rows, head[1:4]), Gallery(gallery(_together(items), names))]
+
+
+def _together(items: Sequence[Item]) -> Content:
+    """All runs of all evaluations in one set of pictures; of two of a name, the first."""
+    content = items[0].result.content
+    data = content.data
+    for item in items[1:]:
+        other = item.result.content.data
+        fresh = {key: label for key, label in other.models.items() if key not in data.models}
+        more = pl.col("model").is_in(list(fresh))
+        data = replace(
+            data, models={**data.models, **fresh},
+            tracks=pl.concat([data.tracks, other.tracks.filter(more)]),
+            errors=pl.concat([data.errors, other.errors.filter(more)]),
+        )  # fmt: skip
+    return replace(content, data=data)
 
 
 def _or_diverged(value: float | None, unit: str = "") -> Line:
