@@ -152,6 +152,11 @@ class Comparison(Printed):
     recording: Path | None
     lost: tuple[ShiplogError, ...] = ()
 
+    def __repr__(self) -> str:
+        runs = ", ".join(run.name for run in self.evaluation.runs)
+        on = listed(self.evaluation.voyages, most=3)
+        return f"Comparison({runs} on {on}; recording {self.recording or 'none'})"
+
     @property
     def lines(self) -> list[str]:
         return [*self.evaluation.lines, "", f"Recording: {self.recording or 'none'}"]
