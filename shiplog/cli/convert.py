@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from shiplog.cli import completion
 from shiplog.cli.options import JsonOption
 from shiplog.cli.output import LOST, answer
 
@@ -25,6 +26,7 @@ def convert(
         typer.Option(
             "--profile",
             help="The profile whose [table] section names the columns; NMEA and bags need none.",
+            autocompletion=completion.profiles,
         ),
     ] = None,
     json_to: JsonOption = None,

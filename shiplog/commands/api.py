@@ -135,7 +135,7 @@ def train(
     voyages: Names = (),
     validation: Names = (),
     seeds: int = 1,
-    window: int = 100,
+    window: int | Literal["auto"] = 100,
     unchecked: bool = False,
     recipe: Literal["fast", "paper"] = "fast",
     width: int = 256,
@@ -157,7 +157,7 @@ def train(
     voyages      names or shell patterns of the voyages to learn from; all where there are none
     validation   those to validate on
     seeds        how many; they are numbered from 0
-    window       length of a window [s]: samples at 1 Hz
+    window       length of a window [s]: samples at 1 Hz; or auto, which follows the ship (L/U)
     unchecked    although the profile still says CHECK, or sensors contradict each other
 
     Of networks:

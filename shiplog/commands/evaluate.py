@@ -32,7 +32,7 @@ from shiplog.training.runs.run_checks import (
 from shiplog.training.runs.voyages_to_test import held_back, say_twins
 from shiplog.voyages.store import contradicted
 from shiplog.voyages.store.store import Store
-from shiplog.voyages.windows import windows
+from shiplog.voyages.windows import ship_time, windows
 from shiplog.voyages.windows.split import plan
 from shiplog.voyages.windows.windows import Windows
 
@@ -94,6 +94,7 @@ def evaluate_runs(
         inside=_inside(scored, bands, cut),
         forces=_forces(opened, rows),
         contradicted=contradicted.of(store, names),
+        ship_time=ship_time.of(first.profile.ship.length_m, first.training()),
     )
 
 

@@ -12,6 +12,8 @@ import sailing
 from commands import call
 
 from pipelines.experiments import simulated_ship
+from shiplog.commands import train as training
+from shiplog.report.result import Answer
 
 FAST = ("--window", "40", "--width", "12", "--epochs", "8")
 
@@ -347,3 +349,34 @@ def test_the_demo_needs_its_logs(tmp_path, monkeypatch):
     empty.mkdir()
     code, _, reported = call("demo", "--no-view", "--logs", empty, "--out", tmp_path / "demo")
     assert code == 1 and "No log in" in reported
+
+
+@pytest.mark.parametrize("named", [(), ("--model", "feedforward")])
+def test_train_without_a_model_says_which_one_and_which_to_begin_with(
+    store, tmp_path, monkeypatch, named
+):
+    """Before the work; whoever names the model knows."""
+    monkeypatch.setattr(training, "train_command", lambda *_: Answer((), {}))
+    code, _, told = call("train", "--store", store, "--out", tmp_path / "run", *named)
+    assert code == 0
+    assert ("trains feedforward" in told and "--model mmg" in told) == (not named)
+
+
+def test_a_window_is_seconds_or_auto(store, tmp_path, monkeypatch):
+    given = []
+    monkeypatch.setattr(training, "train_command", lambda *a: given.append(a[2]) or Answer((), {}))
+    for word in ("40", "auto"):
+        out = tmp_path / word
+        assert call("train", "--store", store, "--out", out, "--window", word)[0] == 0
+    assert [one.window for one in given] == [40, "auto"]
+
+
+def test_auto_is_resolved_before_the_run_is_made(store, tmp_path, monkeypatch):
+    """3 m at less than 0.6 m/s: 100 s, which the run has in its settings."""
+    made = []
+    monkeypatch.setitem(
+        training.FLOWS, "physics",
+        (training.choose_physical_split, lambda *a: made.append(a[2]) or Answer((), {})),
+    )  # fmt: skip
+    call("train", "--model", "mmg", "--store", store, "--out", tmp_path / "r", "--window", "auto")
+    assert [one.window for one in made] == [100]

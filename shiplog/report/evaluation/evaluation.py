@@ -19,6 +19,7 @@ from shiplog.report.result import Printed
 from shiplog.training.runs.load_model import Run
 from shiplog.voyages.store import contradicted
 from shiplog.voyages.store.contradicted import Contradicted
+from shiplog.voyages.windows.ship_time import ShipTime
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,7 @@ class Evaluation(Printed):
     inside     run, channel, share: of the samples inside the 90 % band, where a run has one
     forces     of the first physical run along the voyages, as ComparisonData has them; or None
     contradicted   what was recorded on these voyages and contradicts itself
+    ship_time      L/U of the first run's training voyages
     """
 
     runs: tuple[Run, ...]
@@ -83,6 +85,7 @@ class Evaluation(Printed):
     inside: pl.DataFrame
     forces: pl.DataFrame | None
     contradicted: tuple[Contradicted, ...] = ()
+    ship_time: ShipTime | None = None
 
     def __getitem__(self, run: str) -> RunScores:
         """One run's scores, by its name. Raises RunNotEvaluated."""
@@ -191,6 +194,13 @@ class Evaluation(Printed):
         }
 
     @property
+    def window_advice(self) -> str:
+        """A sentence where the length of the windows does not suit the ship; else empty."""
+        if self.ship_time is None:
+            return ""
+        return self.ship_time.advice(self.runs[0].config.window)
+
+    @property
     def warning(self) -> str:
         """What comes first where the voyages cannot be right; else empty."""
         return contradicted.text(self.contradicted)
@@ -217,6 +227,7 @@ class Evaluation(Printed):
         lines = [
             *([self.warning] if self.warning else []),
             *[self.judgement(run).sentence for run in self.runs],
+            *([self.window_advice] if self.window_advice else []),
             "",
             f"{MEANING} Means over {count} and over seeds:",
             "",
