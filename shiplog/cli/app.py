@@ -79,5 +79,5 @@ def _every(
     """Learn a ship's dynamic model from its logs, and see where it fails."""
 
 
-for _command in COMMANDS:
-    app.command()(_command)
+for _command in COMMANDS:  # the list has each first sentence in full, however narrow the terminal
+    app.command(short_help=(_command.__doc__ or "").split("\n", 1)[0])(_command)

@@ -103,7 +103,7 @@ def draft_profile(path: Path, out: Path | None = None, vessel: str | None = None
     if out is not None:
         refuse_taken(out)
         out = check_file(out, "--out")
-    toml = draft(path, vessel)
+    (toml,) = [draft(one, vessel) for one in tracked([path], "drafting")]
     if out is not None:
         files.write_text(out, toml)
     return Draft(toml, out)
@@ -112,7 +112,8 @@ def draft_profile(path: Path, out: Path | None = None, vessel: str | None = None
 def draft(path: Path, vessel: str | None = None) -> str:
     """TOML text of a profile for a log, a table, or what first has to become a log."""
     reading_limits.begin(path)
-    with saying(f"{path.name}: drafting"), packed.unpacked(path) as source:
+    said = nullcontext() if drawable() else saying(f"{path.name}: drafting")
+    with said, packed.unpacked(path) as source:
         if not path.exists() or is_log(source):
             return draft_log(source, vessel)
         if formats.of(source) is table_rows.FORMAT:

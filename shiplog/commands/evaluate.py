@@ -36,8 +36,11 @@ from shiplog.voyages.windows import ship_time, windows
 from shiplog.voyages.windows.split import plan
 from shiplog.voyages.windows.windows import Windows
 
+# seconds of the sample logs' test voyage
+STAGES = {"reading": 1.0, "simulating": 3.0, "coverage": 1.0, "forces": 1.0}
 
-@staged("evaluating", {"reading": 1.0, "simulating": 3.0, "coverage": 1.0, "forces": 1.0})
+
+@staged("evaluating", STAGES)
 def evaluate_runs(
     paths: Sequence[Path],
     store: Store,
@@ -176,6 +179,7 @@ class Comparison(Printed):
         return self.recording
 
 
+@staged("comparing", STAGES | {"recording": 2.0})
 def compare_runs(
     paths: Sequence[Path],
     store: Store,
@@ -188,6 +192,7 @@ def compare_runs(
     from shiplog.report import viewer
 
     found = evaluate_runs(paths, store, voyages, cause_files)
+    reach("recording")
     lost = save(found)
     recording = save_to or found.runs[0].path / "compare.rrd"
     title = f"{found.runs[0].profile.ship.name}: {listed(found.voyages, most=3)}"

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime
 
 import polars as pl
 
+from shiplog.commands.bars import through
 from shiplog.exceptions import listed
 from shiplog.logs.health import health_report
 from shiplog.nomenclature.contract import CONTRACT
@@ -21,6 +22,8 @@ from shiplog.voyages.sensors.sensor_findings import Estimate
 from shiplog.voyages.store import parts
 from shiplog.voyages.store.store import Store
 
+SHARE_OF_RECORD = 5e-4  # s that a recorded second takes
+PART_S = 600.0  # s, a part of a voyage, for the time that is left
 ESTIMATED = ("kind", "channel", "value", "low", "high", "unit")  # of an estimate, in frame and JSON
 
 
@@ -33,12 +36,20 @@ def campaigns(store: Store, voyages: Sequence[str]) -> list[tuple[SensorCampaign
         part = None if name in starts else parts.parse(name)
         whole, later = (name, 0) if part is None else (part.whole, part.begin)
         begins[name] = starts[whole].timestamp() + later
+    lengths = {entry.name: entry.seconds for entry in store.entries()}
+    seasons = list(campaign_consistency.seasons(begins))
     found = []
-    for names in campaign_consistency.seasons(begins):
+    for names in through(seasons, "comparing sensors", lambda names: _expected_s(names, lengths)):
         profile = store.profile(names)
         rows = dict(zip(names, (t.collect() for t in store.tables(names)), strict=True))
         found.append((campaign_consistency.campaign(rows, profile), profile))
     return found
+
+
+def _expected_s(names: Sequence[str], lengths: Mapping[str, float]) -> float:
+    """Of a campaign: by what was recorded, up to what is used of it."""
+    recorded = sum(lengths.get(name, PART_S) for name in names)
+    return SHARE_OF_RECORD * min(recorded, campaign_consistency.CAMPAIGN_ROWS / 10.0)
 
 
 @dataclass(frozen=True, repr=False)

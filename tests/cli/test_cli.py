@@ -12,6 +12,8 @@ import sailing
 from commands import call
 
 from pipelines.experiments import simulated_ship
+from shiplog import cli
+from shiplog.cli import app
 from shiplog.commands import train as training
 from shiplog.report.result import Answer
 
@@ -186,6 +188,19 @@ def test_the_list_of_commands_has_whole_sentences():
     lines = [line for line in listed if line.strip()]
     assert code == 0 and len(lines) == 12
     assert all(line.endswith(".") and not line.endswith("...") for line in lines)
+
+
+@pytest.mark.parametrize("command", ["", *sorted(c.__name__ for c in app.COMMANDS)])
+def test_help_is_whole_at_60_columns(command, monkeypatch, capsys):
+    """The same words as in a wide terminal, and no line that is wider than it."""
+    words = []
+    for width in (60, 200):
+        monkeypatch.setenv("COLUMNS", str(width))
+        assert cli.run([*filter(None, [command]), "--help"]) == 0
+        reported = capsys.readouterr().out
+        assert all(len(line) <= width for line in reported.splitlines())
+        words.append(reported.split())
+    assert words[0] == words[1]
 
 
 def test_versions_and_the_short_word_for_help():
