@@ -41,7 +41,10 @@ def convert(
     from shiplog.ship_profile import file as profiles
 
     ship = profiles.load(profile) if profile else None
-    from shiplog.commands.convert import convert as convert_tables
+    from shiplog.commands.bars import loading
+
+    with loading():
+        from shiplog.commands.convert import convert as convert_tables
 
     done = convert_tables(tables, ship, out)
     answer(done, json_to)

@@ -32,6 +32,9 @@ def profile(
     if out is not None:  # before the log is read
         refuse_taken(out)
         check_file(out, "--out")
-    from shiplog.commands.convert import draft_profile
+    from shiplog.commands.bars import loading
+
+    with loading():
+        from shiplog.commands.convert import draft_profile
 
     answer(draft_profile(log, out, vessel), json_to)

@@ -170,8 +170,10 @@ def train(
     check_voyages(store, voyages, validation)
     if not _typed(context, "model"):
         typer.echo(NO_MODEL.format(model=model), err=True)
-    from shiplog.commands.train import train_command
+    from shiplog.commands.bars import loading
 
+    with loading():
+        from shiplog.commands.train import train_command
     found = train_command(store, out, options)
     answer(found, json_to)
 

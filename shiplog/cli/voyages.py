@@ -34,7 +34,10 @@ def voyages(
     from dataclasses import asdict
 
     if sensors:
-        from shiplog.commands.sensors import compare_sensors
+        from shiplog.commands.bars import loading
+
+        with loading():
+            from shiplog.commands.sensors import compare_sensors
         from shiplog.voyages.store.store import Store
 
         answer(compare_sensors(Store(store), voyages or []), json_to)
