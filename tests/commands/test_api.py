@@ -129,6 +129,7 @@ def test_coefficients_are_those_of_the_run_folder(published):
     one = run.coefficients["hull.y_v"]
     assert float(one) == known.row(by_predicate=pl.col("name") == "hull.y_v", named=True)["value"]
     assert (one.low, one.high) == (None, None)  # nothing was fitted
+    assert str(one).endswith(", Y'_v, sway damping") and " to " not in str(one)
     assert run.coefficients_frame["unit"].to_list() == known["unit"].to_list()
     assert "fitted to no voyage" in repr(run)
 
@@ -140,6 +141,7 @@ def test_an_identified_coefficient_has_its_interval(published, monkeypatch):
     one = run.coefficients["hull.y_v"]
     assert one.high - one.low == pytest.approx(2 * 0.1645)
     assert one.value == pytest.approx((one.high + one.low) / 2)
+    assert f"({one.low:.3g} to {one.high:.3g})" in str(one)
 
 
 def test_a_diagnosis_has_the_verdict_as_attributes(tmp_path):

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 import polars as pl
 
+from shiplog.nomenclature.numbers import figure
 from shiplog.simulation.extended_simulator import Extension
 
 NINETY_SPREADS = 1.645  # standard deviations to either end of a normal distribution's middle 90 %
@@ -37,6 +38,14 @@ class Coefficient:
 
     def __float__(self) -> float:
         return self.value
+
+    def __str__(self) -> str:
+        """Value, 90 % interval, unit, and what it is."""
+        value = figure(self.value, 3)
+        if self.low is not None and self.high is not None:
+            value += f" ({figure(self.low, 3)} to {figure(self.high, 3)})"
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return ", ".join(filter(None, (f"{value}{unit}", self.symbol, self.meaning)))
 
 
 def of(identified: pl.DataFrame | None, extension: Extension | None) -> dict[str, Coefficient]:
