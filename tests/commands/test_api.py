@@ -7,14 +7,17 @@ import typing
 from dataclasses import fields
 from pathlib import Path
 
+import numpy as np
 import polars as pl
 import pytest
 
 import shiplog
+from shiplog.models.causes import CATALOGUE
 from shiplog.report.diagnosis.diagnosis import Diagnosis
 from shiplog.report.diagnosis.sections.causes import Estimate, NamedCause
 from shiplog.report.diagnosis.verdict import Verdict
-from shiplog.training.runs import load_model
+from shiplog.simulation.extended_simulator import Extension
+from shiplog.training.runs import coefficients, load_model
 from shiplog.training.settings.options import TrainOptions
 from shiplog.training.settings.run_config import DEVICES, RECIPES, WIND_INPUTS
 
@@ -96,6 +99,13 @@ def test_a_wrong_name_is_a_key_error_that_lists_near_ones(opened):
         opened["trp_1"]
     assert isinstance(told.value, shiplog.ShiplogError)
     assert "trip_1, trip_2, trip_3" in str(told.value)
+    with pytest.raises(KeyError, match="There are trip_1"):
+        opened[0]
+
+
+def test_a_folder_that_is_no_store_has_a_repr(tmp_path):
+    (tmp_path / "file").touch()
+    assert repr(shiplog.Store(tmp_path / "file")) == f"Store('{tmp_path / 'file'}')"
 
 
 def test_an_evaluation_of_one_run_has_its_numbers_as_attributes(scored):
@@ -142,6 +152,29 @@ def test_an_identified_coefficient_has_its_interval(published, monkeypatch):
     assert one.high - one.low == pytest.approx(2 * 0.1645)
     assert one.value == pytest.approx((one.high + one.low) / 2)
     assert f"({one.low:.3g} to {one.high:.3g})" in str(one)
+
+
+def test_an_extended_run_has_its_causes_parameters_after_the_bases(published):
+    """A current of 0.5 m/s towards 53.13 deg; one coefficient was fitted again."""
+    run = shiplog.load(published[0])
+    base = run.identified()["value"].to_numpy().copy()
+    base[0] *= 1.5
+    (current,) = [cause for cause in CATALOGUE if cause.label == "current"]
+    held = Extension(
+        (current,), {"current": np.array([0.3, 0.4])}, {"current": np.diag([1e-4, 1e-4])}, {}, {},
+        {}, base,
+    )  # fmt: skip
+    found = coefficients.of(run.identified(), held)
+    names = run.identified()["name"].to_list()
+    assert list(found) == [*names, "current.speed", "current.direction"]
+    speed, direction = found["current.speed"], found["current.direction"]
+    assert (speed.value, speed.unit, speed.cause) == (pytest.approx(0.5), "m/s", "current")
+    # 0.01 m/s of either component are 0.01 m/s along the current: 1.645 of them to each side
+    assert speed.high - speed.low == pytest.approx(2 * 1.645 * 0.01, rel=0.05)
+    assert (direction.value, direction.unit) == (pytest.approx(53.13, abs=0.01), "deg")
+    first, known = found[names[0]], run.coefficients[names[0]]
+    assert (first.value, first.start) == (base[0], known.value) and first.low is None
+    assert coefficients.of(None, held).keys() == {"current.speed", "current.direction"}
 
 
 def test_a_diagnosis_has_the_verdict_as_attributes(tmp_path):

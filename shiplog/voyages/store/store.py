@@ -67,7 +67,10 @@ class Store:
         self.path = Path(path)
 
     def __repr__(self) -> str:
-        names = [entry.name for entry in self.entries()]
+        try:
+            names = [entry.name for entry in self.entries()]
+        except StoreError:  # whoever looks at it in a debugger wants no error
+            return f"Store({str(self.path)!r})"
         return (
             f"Store({str(self.path)!r}: {counted(len(names), 'voyage')}, {listed(names, most=6)})"
         )
@@ -90,7 +93,7 @@ class Store:
     def __getitem__(self, name: str) -> Voyage:
         """A voyage, or a part of one such as `trip[0:1200]`, by its name. Raises VoyageMissing."""
         entries = {entry.name: entry for entry in self.entries()}
-        part = None if name in entries else parts.parse(name)
+        part = None if name in entries else parts.parse(str(name))
         whole = name if part is None else part.whole
         if whole not in entries:
             raise VoyageMissing(name, entries, str(self.path))

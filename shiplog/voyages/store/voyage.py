@@ -128,5 +128,5 @@ class Voyage:
         return self.text
 
     def __repr__(self) -> str:
-        found = counted(len(self.findings), "finding")
-        return f"Voyage({self.name!r}: {self.seconds:.0f} s from {self._began}, {found})"
+        found = "" if self.part else f", {counted(self.entry.findings, 'finding')}"
+        return f"Voyage({self.name!r}: {self.seconds:.0f} s from {self._began}{found})"
