@@ -34,10 +34,7 @@ def ingest(
 
     check_writable(store, "--store")
     check_paths(logs, profile)
-    from shiplog.commands.bars import loading
-
-    with loading():
-        from shiplog.commands.prepare import expand, ingest_logs
+    from shiplog.commands.prepare import expand, ingest_logs
     from shiplog.voyages.store.store import Store
 
     leave(ingest_logs(expand(logs), profile, Store(store), correct), json_to)
