@@ -120,6 +120,12 @@ def test_an_evaluation_of_one_run_has_its_numbers_as_attributes(scored):
     assert scored.summary["loss"].to_list() == [scored.loss, *scored.baselines.values()]
 
 
+def test_a_window_that_does_not_suit_the_ship_is_said(scored):
+    """25 s are three ship times of 3 m at 0.4 m/s, where the paper's 100 s are 13."""
+    assert "auto takes 100 s" in scored.window_advice
+    assert scored.window_advice in scored.lines
+
+
 def test_an_evaluation_of_several_runs_asks_which(opened, published, tmp_path):
     other = tmp_path / "other"
     other.symlink_to(published[0])
