@@ -6,6 +6,7 @@ import sys
 from collections import Counter
 from datetime import UTC, datetime
 
+import polars as pl
 import pytest
 from commands import call
 from hypothesis import given, settings
@@ -20,7 +21,9 @@ from shiplog.report.diagnosis.sections import causes, limits, ranking
 from shiplog.report.diagnosis.sections.causes import Estimate, NamedCause
 from shiplog.report.diagnosis.sections.limits import Limit, Size
 from shiplog.report.diagnosis.sections.ranking import Ranked
+from shiplog.report.evaluation.tables import models_table, parameters_table
 from shiplog.report.evaluation.text_table import Table, table
+from shiplog.report.paper import sets
 
 WIDTHS = (60, 80)
 LONG = ("season2_harbour_manoeuvre_with_tug_23_april_first", "season2_harbour_manoeuvre_second")
@@ -165,3 +168,20 @@ def test_the_tables_of_a_verdict_fit(width):
     assert len(found) == 3
     for one in found:
         whole(one, width)
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_the_tables_of_the_papers_experiment_fit(width):
+    plans = {name: pl.DataFrame({"voyage": ["a"] * 1234}) for name in ("sli10xjit10", "d-ref")}
+    sizes = sets.sizes(plans, dict.fromkeys(plans, LONG), 100)
+    whole(table(tuple(sizes.columns), sizes.rows()), width)
+    models = {name: {"loss": 1234.5, "seeds": [1000.0, 1500.0], "rmse": dict.fromkeys(
+        ("surge", "sway", "yaw_rate"), 0.0123), "end_position_m": 12.3, "end_heading_deg": 4.5}
+        for name in LONG}  # fmt: skip
+    whole(models_table(models, {"hold": 37737.0, "least_squares": 4764.0}, LONG[0]), width)
+    parameters = pl.DataFrame({
+        "name": ["hull.y_vvr"], "symbol": ["Y'_vvr"], "meaning": ["sway of drifting and turning"],
+        "start": [-1.234], "spread": [0.1], "value": [-1.345], "standard_error": [0.0123],
+        "free": [True],
+    })  # fmt: skip
+    whole(parameters_table(parameters), width)
