@@ -32,12 +32,15 @@ from shiplog.training.runs.run_checks import (
 from shiplog.training.runs.voyages_to_test import held_back, say_twins
 from shiplog.voyages.store import contradicted
 from shiplog.voyages.store.store import Store
-from shiplog.voyages.windows import windows
+from shiplog.voyages.windows import ship_time, windows
 from shiplog.voyages.windows.split import plan
 from shiplog.voyages.windows.windows import Windows
 
+# seconds of the sample logs' test voyage
+STAGES = {"reading": 1.0, "simulating": 3.0, "coverage": 1.0, "forces": 1.0}
 
-@staged("evaluating", {"reading": 1.0, "simulating": 3.0, "coverage": 1.0, "forces": 1.0})
+
+@staged("evaluating", STAGES)
 def evaluate_runs(
     paths: Sequence[Path],
     store: Store,
@@ -94,6 +97,7 @@ def evaluate_runs(
         inside=_inside(scored, bands, cut),
         forces=_forces(opened, rows),
         contradicted=contradicted.of(store, names),
+        ship_time=ship_time.of(first.profile.ship.length_m, first.training()),
     )
 
 
@@ -174,6 +178,11 @@ class Comparison(Printed):
     recording: Path | None
     lost: tuple[ShiplogError, ...] = ()
 
+    def __repr__(self) -> str:
+        runs = ", ".join(run.name for run in self.evaluation.runs)
+        on = listed(self.evaluation.voyages, most=3)
+        return f"Comparison({runs} on {on}; recording {self.recording or 'none'})"
+
     @property
     def lines(self) -> list[str]:
         return [*self.evaluation.lines, "", f"Recording: {self.recording or 'none'}"]
@@ -192,6 +201,7 @@ class Comparison(Printed):
         return self.recording
 
 
+@staged("comparing", STAGES | {"recording": 2.0})
 def compare_runs(
     paths: Sequence[Path],
     store: Store,
@@ -204,6 +214,7 @@ def compare_runs(
     from shiplog.report import viewer
 
     found = evaluate_runs(paths, store, voyages, cause_files)
+    reach("recording")
     lost = save(found)
     recording = save_to or found.runs[0].path / "compare.rrd"
     title = f"{found.runs[0].profile.ship.name}: {listed(found.voyages, most=3)}"

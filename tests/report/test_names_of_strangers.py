@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 import sailing
 
-from shiplog.commands import api
+from shiplog.commands import prepare
 from shiplog.diagnosis.residual.interval import Interval
 from shiplog.exceptions import StoreError
 from shiplog.logs.health.health_report import VoyageReport
@@ -64,7 +64,7 @@ def test_the_report_of_a_diagnosis():
 
 def test_a_notebook():
     found = VoyageReport(HTML, 1, 0, 10, 1.0)
-    output = api.Ingested([found], store=Store("store"))._repr_markdown_()
+    output = prepare.Ingested([found], store=Store("store"))._repr_markdown_()
     assert "onerror" in output and harmless(output)
 
 
