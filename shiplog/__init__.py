@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         convert,
         diagnose,
         evaluate,
+        gate,
         ingest,
         load,
         open_store,
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     )
     from shiplog.commands.convert import Converted, Draft
     from shiplog.commands.evaluate import Comparison
+    from shiplog.commands.gate import Gate
     from shiplog.commands.prepare import Ingested
     from shiplog.commands.sensors import SensorComparison
     from shiplog.exceptions import ShiplogError
@@ -48,6 +50,7 @@ __all__ = [
     "Diagnosis",
     "Draft",
     "Evaluation",
+    "Gate",
     "Ingested",
     "Run",
     "SensorComparison",
@@ -60,6 +63,7 @@ __all__ = [
     "convert",
     "diagnose",
     "evaluate",
+    "gate",
     "ingest",
     "load",
     "open_store",
@@ -75,6 +79,7 @@ _CLASSES = {
     "Diagnosis": "report.diagnosis.diagnosis",
     "Draft": "commands.convert",
     "Evaluation": "report.evaluation.evaluation",
+    "Gate": "commands.gate",
     "Ingested": "commands.prepare",
     "Run": "training.runs.load_model",
     "SensorComparison": "commands.sensors",

@@ -44,7 +44,10 @@ def ingest(
     check_writable(store, "--store")
     check_paths(logs, profile)
     page = page_file(report)
-    from shiplog.commands.prepare import expand, ingest_logs
+    from shiplog.commands.bars import loading
+
+    with loading():
+        from shiplog.commands.prepare import expand, ingest_logs
     from shiplog.voyages.store.store import Store
 
     done = ingest_logs(expand(logs), profile, Store(store), correct)

@@ -19,6 +19,7 @@ from shiplog.voyages.store.voyage import Voyage
 if TYPE_CHECKING:
     from shiplog.commands.convert import Converted, Draft
     from shiplog.commands.evaluate import Comparison
+    from shiplog.commands.gate import Gate
     from shiplog.commands.prepare import Ingested
     from shiplog.commands.sensors import SensorComparison
     from shiplog.report.diagnosis.diagnosis import Diagnosis
@@ -262,6 +263,34 @@ def diagnose(
     return diagnosing.diagnose_run(
         path, Store(_path(store)), _names(voyages), Path(out), extend=to, cause_files=_files(causes)
     )
+
+
+def gate(
+    run: AnyRun,
+    store: AnyStore,
+    limits: str | Path,
+    voyages: Names = (),
+    *,
+    diagnosis: str | Path | None = None,
+    causes: Files = (),
+) -> Gate:
+    """Limits of yours against today's results: `holds`, and an outcome for each limit.
+
+    limits     TOML, as docs/use/gate.md has it
+    diagnosis  folder of a diagnosis of these voyages, for limits on verdict and causes; made there
+               where there is none
+    causes     as for `load`
+
+    Raises ShiplogError.
+    """
+    from shiplog.commands import gate as gating
+
+    (path,) = _runs(run)
+    where = None if diagnosis is None else Path(diagnosis)
+    return gating.gate_run(
+        path, Store(_path(store)), Path(limits), _names(voyages), diagnosis=where,
+        cause_files=_files(causes),
+    )  # fmt: skip
 
 
 def _path(store: AnyStore) -> Path:

@@ -37,9 +37,12 @@ from shiplog.report.diagnosis.answer import Context
 from shiplog.report.diagnosis.diagnosis import PAGE, RECORDING, Diagnosis
 from shiplog.report.diagnosis.sections import subject
 from shiplog.report.figures import picture_data, voyage_tables
+from shiplog.report.figures.plots import Plots
 from shiplog.report.page import html
 from shiplog.report.page.diagnosis import page as diagnosis_page
+from shiplog.report.page.diagnosis import source as sources
 from shiplog.report.page.diagnosis.source import PROVENANCE, VERDICT
+from shiplog.report.result import Shown
 from shiplog.ship_profile.profile import Profile
 from shiplog.simulation.extended_simulator import ExtendedSimulator
 from shiplog.training.runs import extension_file, load_model
@@ -245,7 +248,7 @@ def _save(
 ) -> None:
     """Report, verdict and provenance; pictures of an earlier diagnosis do not stay."""
     done.folder.mkdir(parents=True, exist_ok=True)
-    files.write_text(done.report, page.written(done.verdict))
+    files.write_text(done.markdown, page.written(done.verdict))
     files.write_json(done.folder / VERDICT, done.verdict.as_json())
     for name in (RECORDING, PAGE):
         files.remove(done.folder / name)
@@ -270,11 +273,15 @@ def _drawn(done: Diagnosis, run: Run, seconds: voyage_tables.Seconds) -> Diagnos
         picture_data.save(data, done.folder / picture_data.FOLDER)
         if exhibit is not None:
             viewer.save_diagnosis(exhibit, done.folder / RECORDING)
-        html.write(diagnosis_page.of_folder(done.folder), done.folder / PAGE)
+        source = sources.read(done.folder)
+        html.write(diagnosis_page.of_source(source), done.folder / PAGE)
     except (KeyboardInterrupt, SystemExit):
         raise
     except BaseException as error:  # a panic of polars is no Exception
         fault = error if isinstance(error, ShiplogError) else unexpected(error, "drawing")
         log.warning("%s", fault)
         return replace(done, drawn=False)
-    return done
+    shown = Shown(
+        lambda: Plots(source.content), lambda: html.render(diagnosis_page.of_source(source))
+    )
+    return replace(done, shown=shown)

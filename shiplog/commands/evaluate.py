@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,11 @@ from shiplog.models.causes import user
 from shiplog.nomenclature.channels import STATE
 from shiplog.nomenclature.contract import CONTRACT
 from shiplog.report.evaluation.evaluation import Evaluation
-from shiplog.report.result import Printed
+from shiplog.report.figures.plots import Plots
+from shiplog.report.page import html
+from shiplog.report.page.evaluation import page as evaluation_page
+from shiplog.report.page.evaluation import source as sources
+from shiplog.report.result import Shown, Shows
 from shiplog.report.viewer.comparison_data import BAND, ComparisonData, DrawnActuator
 from shiplog.simulation import baselines, prediction_interval, scoring
 from shiplog.simulation import coverage as covering
@@ -81,7 +85,7 @@ def evaluate_runs(
     reach("coverage")
     covered = _coverage(first, rows, numbered, size)
     reach("forces")
-    return Evaluation(
+    found = Evaluation(
         runs=opened,
         voyages=tuple(names),
         too_short=tuple(sorted(set(names) - set(cut.plan["voyage"]))),
@@ -99,6 +103,19 @@ def evaluate_runs(
         contradicted=contradicted.of(store, names),
         ship_time=ship_time.of(first.profile.ship.length_m, first.training()),
     )
+    return replace(found, shown=_shown(found, store))
+
+
+def _shown(found: Evaluation, store: Store) -> Shown:
+    """Pictures and page, once they are asked for."""
+
+    def plots() -> Plots:
+        return Plots(sources.of_evaluation(found, store).content)
+
+    def page() -> str:
+        return html.render(evaluation_page.of_source(sources.of_evaluation(found, store)))
+
+    return Shown(plots, page)
 
 
 def save(evaluation: Evaluation) -> tuple[ShiplogError, ...]:
@@ -117,10 +134,6 @@ def save(evaluation: Evaluation) -> tuple[ShiplogError, ...]:
 def keep_pages(evaluation: Evaluation, store: Store, page: Path | None) -> tuple[ShiplogError, ...]:
     """What `shiplog report RUN` makes its page of, in the folder of a run that was evaluated alone;
     and the page, where one is asked for. Returns what could not be written."""
-    from shiplog.report.page import html
-    from shiplog.report.page.evaluation import page as evaluation_page
-    from shiplog.report.page.evaluation import source as sources
-
     refused = []
     source = sources.of_evaluation(evaluation, store)
     if len(evaluation.runs) == 1:
@@ -167,7 +180,7 @@ def comparison(evaluation: Evaluation, title: str) -> ComparisonData:
 
 
 @dataclass(frozen=True, repr=False)
-class Comparison(Printed):
+class Comparison(Shows):
     """`recording` is a Rerun file of measured and simulated voyages, `evaluation` what it shows.
 
     lost   what could not be written, and why. Without the recording, `recording` is None and all
@@ -177,6 +190,10 @@ class Comparison(Printed):
     evaluation: Evaluation
     recording: Path | None
     lost: tuple[ShiplogError, ...] = ()
+
+    @property
+    def shown(self) -> Shown | None:  # type: ignore[override]  # of the evaluation
+        return self.evaluation.shown
 
     def __repr__(self) -> str:
         runs = ", ".join(run.name for run in self.evaluation.runs)

@@ -21,7 +21,8 @@ from shiplog.machine import reading_limits
 from shiplog.machine.unexpected import unexpected
 from shiplog.nomenclature.numbers import counted
 from shiplog.report.evaluation import tables
-from shiplog.report.result import Printed
+from shiplog.report.page.health import shown as health
+from shiplog.report.result import Shown, Shows
 from shiplog.ship_profile import file as profiles
 from shiplog.ship_profile.profile import Profile
 from shiplog.voyages.ingest.fitting_profile import fitting_profile
@@ -34,7 +35,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, repr=False)
-class Ingested(Printed):
+class Ingested(Shows):
     """What became of logs: `store` holds those in `reports`; `refused` says why of the others.
 
     lost    what of a file that had to become a log first is not in it
@@ -45,6 +46,13 @@ class Ingested(Printed):
     refused: dict[str, ShiplogError] = field(default_factory=dict)
     lost: dict[str, str] = field(default_factory=dict)
     store: Store | None = None
+
+    @property
+    def shown(self) -> Shown | None:  # type: ignore[override]  # made when it is asked for
+        if self.store is None or not self.reports:
+            return None
+        store, names = self.store, list(dict.fromkeys(one.name for one in self.reports))
+        return Shown(lambda: health.plots(store, names), lambda: health.rendered(store, names))
 
     def __repr__(self) -> str:
         taken = (

@@ -5,10 +5,14 @@ Each command has one frozen result. The command line prints it, and `import ship
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from html import escape
+from pathlib import Path
+from typing import Any, Protocol
 
+from shiplog.machine import files
+from shiplog.machine.paths import check_file
 from shiplog.report.evaluation.text_table import inert
 
 
@@ -38,6 +42,51 @@ class Printed:
 
     def _repr_markdown_(self) -> str:
         return inert(str(self))
+
+
+@dataclass(frozen=True)
+class Shown:
+    """How a result is shown; nothing is drawn before it is asked for.
+
+    plots   its pictures, as `figures.plots.Plots`
+    page    its page, as HTML
+    """
+
+    plots: Callable[[], Any]
+    page: Callable[[], str]
+
+
+NOT_SHOWN = "this result has neither pictures nor a page"
+FRAME = '<iframe srcdoc="{}" style="width:100%;height:44rem;border:0" sandbox=""></iframe>'
+
+
+class Shows(Printed):
+    """A result with pictures and a page; a notebook shows the page."""
+
+    shown: Shown | None
+
+    @property
+    def plot(self) -> Any:
+        """`result.plot()` draws all pictures, `result.plot.<name>(ax=…)` one. Raises
+        AttributeError where nothing was compared."""
+        return self._shown.plots()
+
+    def report(self, path: str | Path) -> Path:
+        """The page as a file, which needs nothing else. Raises ShiplogError where it cannot be
+        written."""
+        to = check_file(Path(path), "the page")
+        files.write_text(to, self._shown.page())
+        return to
+
+    def _repr_html_(self) -> str | None:
+        """In a frame of its own, where nothing of it can run."""
+        return None if self.shown is None else FRAME.format(escape(self.shown.page()))
+
+    @property
+    def _shown(self) -> Shown:
+        if self.shown is None:
+            raise AttributeError(NOT_SHOWN)
+        return self.shown
 
 
 @dataclass(frozen=True, repr=False)

@@ -14,7 +14,7 @@ from shiplog.diagnosis.verdict.result import Decision
 from shiplog.report.diagnosis import page
 from shiplog.report.diagnosis.sections.causes import Estimate
 from shiplog.report.diagnosis.verdict import Verdict
-from shiplog.report.result import Printed
+from shiplog.report.result import Shown, Shows
 from shiplog.simulation.error_reduction import Gain
 from shiplog.simulation.extended_simulator import ExtendedSimulator
 from shiplog.training.runs.load_model import Run
@@ -23,7 +23,7 @@ RECORDING, PAGE = "diagnosis.rrd", "report.html"  # in the folder of a diagnosis
 
 
 @dataclass(frozen=True, repr=False)
-class Diagnosis(Printed):
+class Diagnosis(Shows):
     """What the simulation gets wrong, and why.
 
     verdict    named, none, undecided, unknown, coverage or external, with its sentence
@@ -33,6 +33,7 @@ class Diagnosis(Printed):
     held       the held-out windows; None where no stretch is long enough for one
     after      the extended model; None without a named cause
     drawn      whether the pictures could be drawn
+    shown      its pictures and its page
     extended   the run with the causes in it, where one was asked for and a cause is named
     """
 
@@ -46,6 +47,7 @@ class Diagnosis(Printed):
     after: ExtendedSimulator | None = None
     drawn: bool = True
     extended: Run | None = None
+    shown: Shown | None = None
 
     def __repr__(self) -> str:
         named = ", ".join(self.named) or "no cause"
@@ -79,8 +81,8 @@ class Diagnosis(Printed):
         return self.verdict.explained
 
     @property
-    def report(self) -> Path:
-        """Path of the page, in Markdown."""
+    def markdown(self) -> Path:
+        """Path of the report in Markdown."""
         return self.folder / "report.md"
 
     @property
@@ -110,7 +112,7 @@ class Diagnosis(Printed):
     @property
     def lines(self) -> list[str]:
         """The page, and where the files are."""
-        lines = [*page.lines(self.verdict), f"Report: {self.report}"]
+        lines = [*page.lines(self.verdict), f"Report: {self.markdown}"]
         if self.page is not None:
             lines.append(f"Page: {self.page}")
         if self.recording is not None:

@@ -15,7 +15,7 @@ from shiplog.nomenclature.contract import CONTRACT
 from shiplog.nomenclature.numbers import counted, figure
 from shiplog.report.evaluation import tables
 from shiplog.report.evaluation.judgement import MEANING, Judgement, force_line, judge
-from shiplog.report.result import Printed
+from shiplog.report.result import Shown, Shows
 from shiplog.training.runs.load_model import Run
 from shiplog.voyages.store import contradicted
 from shiplog.voyages.store.contradicted import Contradicted
@@ -53,7 +53,7 @@ class RunScores:
 
 
 @dataclass(frozen=True, repr=False)
-class Evaluation(Printed):
+class Evaluation(Shows):
     """Every run and both baselines on the same measured windows.
 
     `evaluation["mmg"]` is a run's `RunScores`, and `for scores in evaluation` goes through them.
@@ -72,6 +72,7 @@ class Evaluation(Printed):
     forces     of the first physical run along the voyages, as ComparisonData has them; or None
     contradicted   what was recorded on these voyages and contradicts itself
     ship_time      L/U of the first run's training voyages
+    shown          its pictures and its page
     """
 
     runs: tuple[Run, ...]
@@ -86,6 +87,7 @@ class Evaluation(Printed):
     forces: pl.DataFrame | None
     contradicted: tuple[Contradicted, ...] = ()
     ship_time: ShipTime | None = None
+    shown: Shown | None = None
 
     def __getitem__(self, run: str) -> RunScores:
         """One run's scores, by its name. Raises RunNotEvaluated."""

@@ -164,16 +164,16 @@ def _limit(axes: Axes, table: pl.DataFrame, length: float, room: float) -> None:
     own = table.filter(pl.col("line") == MEASURED)
     if own.drop_nulls(["x0", "y0"]).is_empty():
         own = table
-    spans = []
-    size = max(float(own[k].max() or 0.0) - float(own[k].min() or 0.0) for k in ("y0", "x0"))
+    ends = [_ends_of(own[name]) for name in ("y0", "x0")]
+    size = max(high - low for low, high in ends)
     margin = max(0.06 * size, 1.2 * length)
-    for name in ("y0", "x0"):
-        low, high = float(own[name].min() or 0.0), float(own[name].max() or 0.0)
-        values = table[name].drop_nulls().to_numpy()
-        values = values[np.isfinite(values)]
-        if len(values):
-            low = min(low, max(float(values.min()), low - room * size))
-            high = max(high, min(float(values.max()), high + room * size))
+    spans = []
+    for (low, high), name in zip(ends, ("y0", "x0"), strict=True):
+        least, most = _ends_of(table[name])
+        low, high = (
+            min(low, max(least, low - room * size)),
+            max(high, min(most, high + room * size)),
+        )
         spans.append((low - margin, high + margin))
     wide = max(spans[0][1] - spans[0][0], SHAPE * (spans[1][1] - spans[1][0]))
     for (low, high), whole, limit in zip(
@@ -181,6 +181,13 @@ def _limit(axes: Axes, table: pl.DataFrame, length: float, room: float) -> None:
     ):
         middle = 0.5 * (low + high)
         limit(middle - 0.5 * whole, middle + 0.5 * whole)
+
+
+def _ends_of(values: pl.Series) -> tuple[float, float]:
+    """The least and the largest finite value; zero without one."""
+    there = values.drop_nulls().to_numpy()
+    there = there[np.isfinite(there)]
+    return (float(there.min()), float(there.max())) if len(there) else (0.0, 0.0)
 
 
 def _label(axes: Axes, data: PictureData, voyage: str) -> None:

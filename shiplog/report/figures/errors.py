@@ -86,7 +86,8 @@ def draw(axes: Axes, rows: pl.DataFrame, content: Content, of: str) -> None:
     axes.set_ylabel("position error [m]" if of == POSITION else "heading error [deg]")
     if of == POSITION:
         lengths = axes.secondary_yaxis(
-            "right", functions=(lambda m: m / data.length, lambda lengths: lengths * data.length)
+            "right",
+            functions=(lambda m: np.divide(m, data.length), lambda n: np.multiply(n, data.length)),
         )
         lengths.set_ylabel("ship lengths")
     axes.legend(loc="upper left")

@@ -138,7 +138,7 @@ def load(folder: Path) -> PictureData:
             breadth=float(facts["breadth"]), outline=_points(facts["outline"]),
             banks=tuple(_points(bank) for bank in facts["banks"]), models=dict(facts["models"]),
             named=tuple(facts["named"]),
-            current=None if facts["current"] is None else tuple(map(float, facts["current"])),
+            current=None if facts["current"] is None else _points([facts["current"]])[0],
             **tables,
         )  # fmt: skip
     except (OSError, ValueError, KeyError, TypeError, pl.exceptions.PolarsError) as error:

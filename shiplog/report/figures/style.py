@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 WIDTH = 4.0  # inches: at 72 points an inch less than a phone's screen, so letters are no smaller
 HEIGHT = 2.75  # inches
 POINTS = 900  # of a line: about two for each point of its width on a screen
-RULES: dict[str, Any] = {
+RULES: dict[Any, Any] = {
     "font.size": 8.5, "font.family": "sans-serif", "font.sans-serif": ["DejaVu Sans"],
     "axes.linewidth": 0.6, "axes.titlesize": 9.0, "axes.titleweight": "bold",
     "axes.titlelocation": "left", "axes.spines.top": False, "axes.spines.right": False,

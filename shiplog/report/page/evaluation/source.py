@@ -124,7 +124,7 @@ def _pictures(found: Evaluation, voyages: pl.DataFrame) -> PictureData:
         .agg(pl.col("elapsed").first(), pl.col("loss").mean())
         .with_columns(loss=pl.when(pl.col("loss").is_finite()).then("loss"))
     )
-    data = {
+    tables: dict[str, Any] = {
         "voyages": voyages,
         "measured": found.rows.select("voyage", pl.col("elapsed").alias("time"), *states),
         "tracks": pl.concat(
@@ -147,7 +147,7 @@ def _pictures(found: Evaluation, voyages: pl.DataFrame) -> PictureData:
             outline=tuple(profile.ship.outline or ()),
             banks=tuple(tuple((x, y) for x, y in bank) for bank in profile.site.banks),
             models={name: name for name in names},
-            **data,
+            **tables,
         )
     )
 

@@ -100,17 +100,18 @@ def _voyages(store: Store, names: Sequence[str], reports: dict[str, VoyageReport
     head = ("voyage", "length", "rows at 10 Hz", "usable", "windows of 100 s", "findings")
     found: list[Block] = [Grid(head, rows, head[1:])]
     try:
-        content = _content(store, names, reports)
+        drawn = content(store, names, reports)
     except ShiplogError as error:  # two ships, or two profiles: the table stands without pictures
         return [*found, Paragraph([f"No pictures: {error}"])]
-    found.append(Gallery(gallery(content, ("stretches", "wind", "drift"))))
-    tracks = [d for name in names[:MOST_TRACKS] for d in gallery(content, ("track",), name)]
+    found.append(Gallery(gallery(drawn, ("stretches", "wind", "drift"))))
+    tracks = [d for name in names[:MOST_TRACKS] for d in gallery(drawn, ("track",), name)]
     if tracks:
         found.append(Gallery(tracks))
     return found
 
 
-def _content(store: Store, names: Sequence[str], reports: dict[str, VoyageReport]) -> Content:
+def content(store: Store, names: Sequence[str], reports: dict[str, VoyageReport]) -> Content:
+    """What the pictures are drawn from: tracks, conditions, and the findings as stretches."""
     profile = store.profile(names)
     seconds = voyage_tables.Seconds.of(store, names, profile)
     states = (c.name for c in STATE)
