@@ -48,9 +48,6 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from shiplog.machine import disk_cache
-
-    disk_cache.keep_compiled()
     from shiplog.commands import api
 
     return getattr(api, name)
