@@ -294,7 +294,7 @@ def _edges(states: np.ndarray, half: np.ndarray | None) -> dict[str, pl.Series]:
 
 
 def _coverage(run: Run, rows: pl.DataFrame, numbered: pl.DataFrame, size: int) -> pl.DataFrame:
-    covered = covering.of(run.training(), run.profile.actuator_names, run.profile.has_wind)
+    covered = covering.learn(run.training(), run.profile.actuator_names, run.profile.has_wind)
     measured = covered.table(rows, numbered, size)
     whole = numbered.hstack(measured)
     reasons = []

@@ -11,7 +11,7 @@ import pytest
 from shiplog.diagnosis.hypotheses import evaluate, evidence
 from shiplog.diagnosis.hypotheses.evaluate import RELINEARISATIONS
 from shiplog.diagnosis.noise.remainder import Remainder
-from shiplog.diagnosis.trial.fitted import Found, Start
+from shiplog.diagnosis.trial.fitted import Estimate, Start
 
 NOISE = 0.1
 
@@ -31,7 +31,7 @@ def fits(monkeypatch, function, slope) -> tuple[Any, list[float]]:
         step = off / by
         density = -0.5 * off**2
         value = density + 0.5 * (step * by) ** 2 - np.log(by)
-        return Found("", value, 1.0, {"x": np.array([x + step])}, np.eye(1) / by**2,
+        return Estimate("", value, 1.0, {"x": np.array([x + step])}, np.eye(1) / by**2,
                      density=density)  # fmt: skip
 
     monkeypatch.setattr(evidence, "fit", fit)
@@ -41,7 +41,7 @@ def fits(monkeypatch, function, slope) -> tuple[Any, list[float]]:
 
 def converge(trial, included, numbers, path, lowest=-np.inf):
     fit = evaluate.evaluate(trial, included, Remainder(), Start(numbers, path), lowest)
-    return fit.point, fit.found
+    return fit.point, fit.estimate
 
 
 def test_what_is_linear_takes_one_step(monkeypatch):
@@ -84,7 +84,7 @@ def test_numbers_of_a_fit_without_end_are_in_the_order_of_their_covariance(monke
 
     def fit(*_):
         numbers = {"a": np.array([9.0]), "b": np.array([9.0])}
-        return Found("", 0.0, 1.0, numbers, np.diag([1.0, 0.01]), density=0.0)
+        return Estimate("", 0.0, 1.0, numbers, np.diag([1.0, 0.01]), density=0.0)
 
     trial.at = at
     monkeypatch.setattr(evidence, "scan", lambda *given, **_: (fit(*given), []))
@@ -118,7 +118,7 @@ def test_numbers_that_the_model_has_already_are_never_halved(monkeypatch):
 
     def fit(_trial, point, *_):
         numbers = {"held": point.numbers["held"], "x": np.zeros(1)}
-        return Found("", 0.0, 1.0, numbers, np.eye(2), density=0.0)
+        return Estimate("", 0.0, 1.0, numbers, np.eye(2), density=0.0)
 
     trial.at = at
     monkeypatch.setattr(evidence, "scan", lambda *given, **_: (fit(*given), []))
@@ -148,7 +148,7 @@ def test_a_path_that_nominal_noise_holds_too_firmly_refutes_no_numbers(
 
     def scan(_trial, point, *_, **__):
         density = 0.0 if held[-1] == 4.0 else -100.0
-        return Found("", density, noise, point.numbers, np.eye(1), density=density), []
+        return Estimate("", density, noise, point.numbers, np.eye(1), density=density), []
 
     trial.at, trial.first = at, SimpleNamespace()
     monkeypatch.setattr(evidence, "scan", scan)

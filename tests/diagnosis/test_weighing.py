@@ -33,7 +33,7 @@ def test_an_intermittent_force_is_tested_with_no_family(monkeypatch):
         search = search_of(trial, point, estimate=no_force)
         search.weigh((), {}, point)
         table = search.table
-        assert table.found[(), RAISED].found.noise_factor > 1.5
+        assert table.found[(), RAISED].estimate.noise_factor > 1.5
         assert asked[0].kind == RAISED
         assert ((), INTERMITTENT) not in table.found  # it gains nothing: it is raised noise
 
@@ -108,7 +108,7 @@ def test_an_intermittent_force_is_a_hypothesis_where_it_gains_more_than_raised_n
     one, raised = table.found[(), INTERMITTENT], table.found[(), RAISED]
     assert one.remainder.intermittent == pytest.approx(2.0 * unit)
     assert one.side_force.device == 0.5
-    again = evidence.level(trial, point, one.found.noise_factor, (), one.remainder)
+    again = evidence.level(trial, point, one.estimate.noise_factor, (), one.remainder)
     assert one.evidence == pytest.approx(again.value)
     assert one.evidence > raised.evidence + 5.0
 

@@ -92,7 +92,7 @@ def test_every_part_is_taken_out_by_a_switch_of_its_own():
 @pytest.mark.parametrize("part", list(without.ESTIMATES))
 def test_what_is_replaced_in_the_nominal_fit_comes_back(part):
     watched = {
-        "discrepancy": (discrepancy, "SEEN"),
+        "discrepancy": (discrepancy, "MODELLED"),
         "robust-weights": (campaign_characteristics, "robust_weights"),
     }  # fmt: skip
     before = getattr(*watched[part])
