@@ -192,7 +192,7 @@ class Straight(Trial):
 
     given: Linear | None = None
 
-    def at(self, numbers, near=None, noise_factor=None, remainder=None) -> Point:
+    def linearise(self, numbers, near=None, noise_factor=None, remainder=None) -> Point:
         assert self.given is not None
         columns, ref = self.reference.columns, self.reference
         d = np.concatenate((np.zeros(columns.base), columns.numbers(dict(numbers))))
@@ -204,7 +204,7 @@ class Straight(Trial):
 def trial(made: Campaign, record: Record, given: Linear, fixed: tuple[str, ...] = ()) -> Straight:
     """One of equal weights that was linearised where nothing has changed."""
     found = Straight.build(made, record, fixed, given=given)
-    return replace(found, first=found.at({}))
+    return replace(found, first=found.linearise({}))
 
 
 def no_hull(_: Fit) -> SideForce:

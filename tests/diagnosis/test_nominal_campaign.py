@@ -214,11 +214,11 @@ def test_columns_follow_one_another(learned):
     _, made = learned
     columns = made.reference.columns
     at = columns.linearised
-    for family in (*made.discrepancy.families, *made.unseen.families):
+    for family in (*made.discrepancy.families, *made.omitted.families):
         assert family.columns.tolist() == list(range(at, at + len(family.columns)))
         at += len(family.columns)
     assert len(columns.unit) == columns.linearised + made.discrepancy.count
-    assert all(len(one) == 1 + len(columns.unit) + made.unseen.count for one in made.each)
+    assert all(len(one) == 1 + len(columns.unit) + made.omitted.count for one in made.each)
     assert len(made.each) == len(made.parts) == len(parts_of(made.reference.nominal.cut.voyage))
 
 

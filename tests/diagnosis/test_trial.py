@@ -204,14 +204,14 @@ def test_the_model_as_it_stands_is_linearised_until_its_evidence_stays(made):
     asked: list[float] = []
 
     class Closing(straight.Straight):
-        def at(self, *more):
+        def linearise(self, *more):
             asked.append(3.0 * 0.1 ** len(asked))
             off = given.e + asked[-1] * np.sin(np.arange(given.e.size)).reshape(given.e.shape)
-            return straight.Straight.at(replace(self, given=replace(given, e=off)), *more)
+            return straight.Straight.linearise(replace(self, given=replace(given, e=off)), *more)
 
     trial, point = evidence.begin(Closing.build(nominal, record, given=given), {})
     at_end, _ = evidence.scan(trial, point, (), ())
-    closest, _ = evidence.scan(trial, straight.Straight.at(trial, {}), (), ())
+    closest, _ = evidence.scan(trial, straight.Straight.linearise(trial, {}), (), ())
     assert 3 < len(asked) < evidence.MOST_PATHS
     assert at_end.evidence == pytest.approx(closest.evidence, abs=evidence.LITTLE_NATS)
 

@@ -42,7 +42,9 @@ def test_a_change_that_is_there_is_found_at_its_size(made):
     weights = np.zeros(plain.omitted.count)
     first = plain.omitted.families[0].columns[0]
     weights[family.columns - first] = 9.0 * rng.standard_normal(len(family.columns))
-    accelerations = plain.omitted.accelerations(plain.at({}).linear.cut, plain.grid) @ weights
+    accelerations = (
+        plain.omitted.accelerations(plain.linearise({}).linear.cut, plain.grid) @ weights
+    )
     columns = straight.columns_of(CAUSES)
     given = straight.passed(record, columns, seed=2, sensitivity=0.3, accelerations=accelerations)
     trial = straight.trial(nominal, record, given)
@@ -66,7 +68,9 @@ def test_a_change_acts_on_the_channels_of_its_acceleration(made):
     at = (family.columns - plain.omitted.families[0].columns[0])[3 * EVEN["time"] :]
     each = len(at) // 3  # channel by channel: sway's are in the middle
     weights[at[each : 2 * each]] = 20.0
-    accelerations = plain.omitted.accelerations(plain.at({}).linear.cut, plain.grid) @ weights
+    accelerations = (
+        plain.omitted.accelerations(plain.linearise({}).linear.cut, plain.grid) @ weights
+    )
     given = straight.passed(
         record, straight.columns_of(CAUSES), seed=2, sensitivity=0.3, accelerations=accelerations
     )

@@ -153,3 +153,19 @@ def test_with_raised_noise_a_family_counts_where_it_alone_is_likelier_than_the_n
     change = weighing.change(either, either, "time")
     assert change.remainder == Remainder("time", 3.0, noisy)
     assert change.value == (pytest.approx(raised + gain) if noisy else -math.inf)
+
+
+@pytest.mark.parametrize("acts", [True, False])
+def test_what_explains_half_a_tenth_of_raised_noise_is_an_error_of_its_spectrum(acts, monkeypatch):
+    """The family alone is likelier than the noise, as parts differ by as much as the trial does."""
+    trial, point = trial_with({}, accelerations=raised_noise())
+    trial = replace(trial, campaign=replace(trial.campaign, noise=1.0))
+    of = replace(search_of(trial, point).cause_set(()), spectrum=acts)
+    levels = weighing.nominal_levels(trial, point, (), 1.0)
+    either = weighing.Rough(of, point, weighing.RAISING, levels)
+    gain = 0.5 * either.spectrum()
+    assert gain > 2.0
+    monkeypatch.setattr(evidence, "family_change", lambda *given: (gain, 3.0))
+    change = weighing.change(either, either, "time")
+    assert change.remainder == Remainder("time", 3.0, True)
+    assert change.value == (-math.inf if acts else pytest.approx(either.best.value + gain))

@@ -253,7 +253,7 @@ def test_causes_converge_from_where_they_converged_before(compass):
     asked = []
 
     class Counted(Trial):
-        def at(self, numbers, *given):
+        def linearise(self, numbers, *given):
             asked.append(numbers)
             return super().linearise(numbers, *given)
 

@@ -245,11 +245,11 @@ def test_a_fit_that_runs_away_takes_a_shorter_step(still, monkeypatch):
 
     found = fitted(0.8)
     assert away == [0.8, 0.4] and abs(found.numbers["heading_offset"][0]) < 0.02
-    assert -30.0 < found.evidence - decision.nothing.found.evidence < thresholds.SHOWS_NATS
+    assert -30.0 < found.evidence - decision.nothing.estimate.evidence < thresholds.SHOWS_NATS
     away.clear()
     found = fitted(8.0)
     assert away == [8.0, 4.0, 2.0, 1.0] and found.evidence == -np.inf
     # nothing that converges is so high: each step went too far
-    low = decision.nothing.found.evidence + 900.0
+    low = decision.nothing.estimate.evidence + 900.0
     found = fitted(0.01, low)
     assert found.evidence == -np.inf
