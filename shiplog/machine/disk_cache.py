@@ -73,11 +73,6 @@ def sizes() -> dict[str, tuple[int, int]]:
     return found
 
 
-def size() -> int:
-    """Bytes of all files."""
-    return sum(bytes_ for _, bytes_, _ in files())
-
-
 def trim(limit: int = LIMIT) -> int:
     """Remove the oldest files until no more than `limit` bytes are kept; the bytes removed."""
     found = files()

@@ -143,11 +143,11 @@ def test_a_sign_that_is_the_other_way_round_is_found(sea, words):
     what a wrong sign does must not drown in what else is wrong."""
     cut, model = sea.done.held.cut, sea.done.after
     (turned,) = [
-        w for s, w in sign_conventions.windows_under_conventions(PROFILE, cut) if words in s
+        one.windows for one in sign_conventions.conventions(PROFILE, cut) if words in one.words
     ]
-    found, loss = sign_conventions.best(model, turned)
-    assert words in found
-    assert loss == pytest.approx(model.losses(cut).mean(), rel=1e-4)
+    found = sign_conventions.try_conventions(model, turned)
+    assert words in found.words
+    assert found.loss == pytest.approx(model.losses(cut).mean(), rel=1e-4)
     why = HeldOut(turned, model, sea.done.trial).lost(None)
     if "sign" in words:  # the others do not double the error of so short a trial
         assert words in why and f"L is {loss:.0f}" in why

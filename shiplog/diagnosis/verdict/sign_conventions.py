@@ -83,19 +83,13 @@ class Tried:
     there: float | None = None
 
 
-def best(simulator: ExtendedSimulator, cut: Windows) -> tuple[str, float]:
-    """argmin over conventions of mean L on these windows, in words, and that L. A window in which
-    the model diverges has an L of RUNAWAY."""
-    found = try_conventions(simulator, cut)
-    return found.words, found.loss
-
-
 def try_conventions(
     simulator: ExtendedSimulator, cut: Windows, nominal: Windows | None = None,
     read_as: Profile | None = None,
 ) -> Tried:  # fmt: skip
-    """As `best`: argmin of h L max(L_hold/L_hold', 1), with L_hold of constant velocities as the
-    windows are and L_hold' under the convention, and a handicap h (NEARLY, UNSTATED, else 1).
+    """argmin over conventions of h L max(L_hold/L_hold', 1), with the mean L on these windows
+    (RUNAWAY of one in which the model diverges), L_hold of constant velocities as the windows are
+    and L_hold' under the convention, and a handicap h (NEARLY, UNSTATED, else 1).
     Where nominal windows are given, conventions that these show as well (L'/L ≤ THERE_TOO) are left
     out: their model has them, too.
 
@@ -132,12 +126,6 @@ def _mean(simulator: ExtendedSimulator, cut: Windows) -> float:
 def _hold(cut: Windows) -> float:
     """Mean L of keeping the first velocities."""
     return float(parts(cut.state[:, :1] - cut.state, cut.dt).sum(1).mean()) if len(cut) else 0.0
-
-
-def windows_under_conventions(profile: Profile, cut: Windows) -> Iterator[tuple[str, Windows]]:
-    """Each convention in words, and the windows under it."""
-    for one in conventions(profile, cut):
-        yield one.words, one.windows
 
 
 def conventions(profile: Profile, cut: Windows, read_as: Profile | None = None) -> Iterator[Turned]:

@@ -71,19 +71,10 @@ def is_nmea(path: Path) -> bool:
     return bool(filled) and sentences >= SENTENCE_SHARE * len(filled)
 
 
-def read_nmea(path: Path) -> tuple[list[Series], int]:
-    """An NMEA log as topics, and how many of its sentences were damaged.
-
-    Raises ChannelMissing where no sentence says anything of a ship, or none has a time.
-    """
-    found = read_nmea_log([path], path.name)
-    return found.series, found.damaged
-
-
 def read_nmea_log(paths: Sequence[Path], name: str) -> NmeaLog:
     """One log of a text, or of several that one recorder wrote, an instrument each.
 
-    Raises ChannelMissing as `read_nmea` does."""
+    Raises ChannelMissing where no sentence says anything of a ship, or none has a time."""
     if len(paths) == 1:
         return read_sentences(_text(paths[0]), name)
     reader = _Reader()
