@@ -150,7 +150,7 @@ def test_a_sign_that_is_the_other_way_round_is_found(sea, words):
     assert found.loss == pytest.approx(model.losses(cut).mean(), rel=1e-4)
     why = HeldOut(turned, model, sea.done.trial).lost(None)
     if "sign" in words:  # the others do not double the error of so short a trial
-        assert words in why and f"L is {loss:.0f}" in why
+        assert words in why and f"L is {found.loss:.0f}" in why
     assert HeldOut(cut, model, sea.done.trial).lost(None) == ""
 
 
