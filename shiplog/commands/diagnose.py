@@ -85,7 +85,7 @@ def diagnose_run(
     if switches.time_scale:
         nominal, recorded = trial_voyages.rescale_time(run, nominal, recorded)
     used = [*names, *store.there(run.trained_on)]
-    against = contradicted.of(store, dict.fromkeys(used))
+    against = contradicted.list_contradicted(store, dict.fromkeys(used))
     if contradicted.everywhere(against):
         done = Diagnosis(answer.contradicted(run, recorded, before_effect, against), out)
     elif answer.enough(recorded):

@@ -93,7 +93,7 @@ def evaluate_runs(
         baseline_losses=_baseline_losses(first, cut),
         inside=_inside(scored, bands, cut),
         forces=_forces(opened, rows),
-        contradicted=contradicted.of(store, names),
+        contradicted=contradicted.list_contradicted(store, names),
     )
 
 

@@ -89,7 +89,7 @@ def lines_to_series(lines: Iterable[str], name: str, received: Sequence[int]) ->
     """Sentences with the recorder's time [ns] of each, as topics. Raises ChannelMissing."""
     reader, read = _Reader(), Lines()
     for line, stamp in zip(lines, received, strict=True):
-        for sentence in read.of(line, stamp):
+        for sentence in read.accept(line, stamp):
             reader.take(sentence)
     return reader.finish(name, [read]).series
 
@@ -98,7 +98,7 @@ def read_sentences(lines: Iterable[str], name: str) -> NmeaLog:
     """The same of lines. Raises ChannelMissing."""
     reader, read = _Reader(), Lines()
     for line in lines:
-        for sentence in read.of(line):
+        for sentence in read.accept(line):
             reader.take(sentence)
     return reader.finish(name, [read])
 
@@ -129,7 +129,7 @@ def _stamped(lines: Lines, path: Path) -> Iterator[tuple[int, Sentence]]:
     """The sentences of a file, each with the last receive stamp before it [ns]."""
     last = -1
     for line in _text(path):
-        for sentence in lines.of(line):
+        for sentence in lines.accept(line):
             last = max(last, sentence.received)
             yield last, sentence
 

@@ -129,7 +129,7 @@ class Run(RunFolder, ABC):
 
     @abstractmethod
     def forces(self, seconds: pl.DataFrame) -> pl.DataFrame | None:
-        """Part by part along measured voyages, as `force_breakdown.along`; None where there are
+        """Part by part along measured voyages, as `force_breakdown.break_down`; None where there are
         no parts."""
 
     @abstractmethod
