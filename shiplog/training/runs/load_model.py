@@ -129,8 +129,8 @@ class Run(RunFolder, ABC):
 
     @abstractmethod
     def forces(self, seconds: pl.DataFrame) -> pl.DataFrame | None:
-        """Part by part along measured voyages, as `force_breakdown.break_down`; None where there are
-        no parts."""
+        """Part by part along measured voyages, as `force_breakdown.break_down`; None where there
+        are no parts."""
 
     @abstractmethod
     def _numbers(self, seed: int) -> tuple[Any, np.ndarray, np.ndarray]:
