@@ -228,35 +228,6 @@ def test_a_fork_says_how_it_ended_and_what_it_wrote(text, expected):
     assert outcome(text) == expected
 
 
-@linux
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("child.limit(memory=child.reserved() + (1 << 26)); bytearray(1 << 28)", "MemoryError"),
-        ("child.limit(memory=child.reserved() + (1 << 28)); bytearray(1 << 26)", ""),
-        ("child.limit(seconds=0.0)\nwhile True: pass", "SIGXCPU"),
-        ("child.limit(memory=0)\nwith child.unlimited(): bytearray(1 << 26)", ""),
-    ],
-    ids=["memory", "enough memory", "time", "lifted"],
-)
-def test_a_limit_ends_what_passes_it(text, expected):
-    command = [sys.executable, "-c", "from shiplog.machine import child\n" + text]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    last = done.stderr.strip().rpartition("\n")[2]
-    assert (child.ending_signal(done.returncode) or last) == expected
-
-
-@linux
-def test_a_limit_stays_below_that_of_the_system():
-    program = (
-        "import resource; from shiplog.machine import child\n"
-        "resource.setrlimit(resource.RLIMIT_DATA, (1 << 30, 1 << 30))\n"
-        "child.limit(memory=1 << 40)\nprint(resource.getrlimit(resource.RLIMIT_DATA)[0])"
-    )
-    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True)
-    assert done.stdout == f"{1 << 30}\n"
-
-
 def test_no_signal_ended_what_ended_by_itself():
     assert [child.ending_signal(code) for code in (None, 0, 3)] == ["", "", ""]
 

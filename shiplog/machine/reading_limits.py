@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from shiplog.exceptions import LogUnreadable
-from shiplog.machine import child
+from shiplog.machine import limits
 
 # Of a small file, and of a large one: memory, of which the libraries alone reserve 0.4 GB on two
 # cores and more on many; and processor time, of which a sound log takes 1 s for a MB on the slower
@@ -54,7 +54,7 @@ def grown(path: Path) -> None:
     """What the file that is being read has become: unpacked, it is larger."""
     if watch is not None:
         size = size_of(path)
-        child.limit(memory(size), LEAST_S + S_PER_MB * size / 1e6)
+        limits.set_limits(memory(size), LEAST_S + S_PER_MB * size / 1e6)
 
 
 def end() -> None:

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 import polars as pl
 
 from shiplog.logs.decoding.tables import Tables, Tally
-from shiplog.machine import child, files, reading_limits
+from shiplog.machine import child, files, limits, reading_limits
 
 if TYPE_CHECKING:
     import subprocess
@@ -65,8 +65,8 @@ def read_most(tables: Tables, tally: Tally, filled: Collection[str] = ()) -> set
     with files.temporary_folder() as folder:
         seconds = START_TIMEOUT_S + sum(expected.values()) / PACE
         request = {"log": str(tables.found.path.resolve()), "folder": str(folder), "topics": asked}
-        limits = {"seconds": seconds, "bytes": reading_limits.memory(tables.found.size)}
-        rows = worker().ask(request | limits, seconds).get("rows", [])
+        most = {"seconds": seconds, "bytes": reading_limits.memory(tables.found.size)}
+        rows = worker().ask(request | most, seconds).get("rows", [])
         for number, (topic, got) in enumerate(zip(asked, rows, strict=False)):
             if got == expected[topic] and _take(tables, topic, folder / f"{number}.arrow"):
                 done.add(topic)
@@ -181,7 +181,7 @@ class Worker:
     def _running(self) -> subprocess.Popen[str]:
         if self._process is None or not self.runs:
             self._stop()
-            with child.unlimited():
+            with limits.lifted():
                 self._process = child.script(WORKER)
         return self._process
 

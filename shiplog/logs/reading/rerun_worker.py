@@ -24,7 +24,7 @@ from rerun.chunk import McapReader
 
 sys.path.append(str(Path(__file__).parents[3]))  # last: as the script that started it finds shiplog
 
-from shiplog.machine import child
+from shiplog.machine import child, limits
 
 DECODERS = ["protobuf", "ros2_reflection"]  # the lossless ones: the others reshape what they know
 RECORDER_TIMES = ("log_time", "publish_time")
@@ -81,7 +81,7 @@ def main() -> None:
     for line in child.requests():
         asked = json.loads(line)
         faulthandler.dump_traceback_later(asked["seconds"], exit=True)  # also when nobody waits
-        child.limit(child.reserved() + asked["bytes"])  # Rerun itself has 2 GB on two cores
+        limits.set_limits(limits.reserved() + asked["bytes"])  # Rerun itself has 2 GB on two cores
         try:
             reply = {"rows": extract(asked["log"], Path(asked["folder"]), asked["topics"])}
         except Exception as error:
