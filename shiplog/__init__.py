@@ -98,9 +98,6 @@ def __getattr__(name: str) -> Any:
         return version("shiplog")
     from importlib import import_module
 
-    from shiplog.machine import disk_cache
-
-    disk_cache.keep_compiled()
     return getattr(import_module(f"shiplog.{_CLASSES.get(name, 'commands.api')}"), name)
 
 

@@ -107,7 +107,7 @@ def linear(observed: Record) -> Linear:
     model = Extended(MODEL, (), MODEL, np.zeros(0), {})
     g = segments.grid(observed)
     cut = segments.cut(observed, residual_acceleration.covering(observed))
-    path = linearisation.pulled(model, THETA, cut, g, WIDE)
+    path = linearisation.fit_path(model, THETA, cut, g, WIDE)
     y, z = linearisation.simulated(model, THETA, cut, path, g)
     at = np.concatenate((np.zeros_like(path.start), path.acceleration.reshape(len(y), -1)), 1)
     e = cut.y - y + np.einsum("sbcz,sz->sbc", z, at)

@@ -20,7 +20,7 @@ NOMINAL_SEED, TRIAL_SEED = 1, 2
 def numbers_of(columns, hidden) -> np.ndarray:
     whole = np.zeros(columns.linearised)
     for label, values in hidden.items():
-        whole[columns.of[label]] = values
+        whole[columns.indices[label]] = values
     return whole
 
 
@@ -40,8 +40,8 @@ def trial_with(hidden, causes=CAUSES, fixed=None, alike=None, **changes):
     if alike is not None:
         one, other, share = alike
         j = given.j.copy()
-        j[..., columns.of[other]] *= share
-        j[..., columns.of[other]] += j[..., columns.of[one]]
+        j[..., columns.indices[other]] *= share
+        j[..., columns.indices[other]] += j[..., columns.indices[one]]
         given = replace(given, j=j)
     given = replace(given, e=given.e + given.j @ numbers_of(columns, hidden))
     trial = straight.trial(campaign, record, given, tuple(fixed or {}))

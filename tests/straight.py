@@ -122,7 +122,7 @@ def passed(
     # each cause in columns of its own stream: another order of the causes is the same data
     for cause in columns.causes:
         own = np.random.default_rng([seed, *cause.label.encode()])
-        at = columns.of[cause.label]
+        at = columns.indices[cause.label]
         drawn = own.standard_normal((*cut.y.shape, len(at))) * NOISE[:, None] * sensitivity
         j[..., at] = drawn / columns.unit[at]
     d = np.zeros(count) if numbers is None else numbers
@@ -149,10 +149,12 @@ def campaign(
     size_of = PROCESS_NOISE.acceleration
     of_own = Discrepancy((), size_of)
     if names:
-        of_own = discrepancy.of(PROFILE, size_of, first, names, nodes)
+        of_own = discrepancy.build(PROFILE, size_of, first, names, nodes)
     columns = columns.with_misfit(of_own.count)
     count = len(columns.unit)
-    unseen = discrepancy.of(PROFILE, PROCESS_NOISE.acceleration, count, discrepancy.UNSEEN, nodes)
+    unseen = discrepancy.build(
+        PROFILE, PROCESS_NOISE.acceleration, count, discrepancy.OMITTED, nodes
+    )
     modes = likelihood.modes(likelihood.weighed(given, PROCESS_NOISE), PROCESS_NOISE)
     if of_own.families:
         modes = modes.joined(of_own.accelerations(given.cut, g))
@@ -165,7 +167,7 @@ def campaign(
         weight[part] = 1.0
         each.append(whole.total(weight) * np.outer(by, by))
     spread = np.full(count, deviation)
-    sizes = columns.known**-0.5
+    sizes = columns.prior_information**-0.5
     sizes[first:] = size
     anchor = np.zeros(count)
     kept = [reduced(one[: 1 + count, : 1 + count], spread)[0] for one in each]
@@ -190,19 +192,19 @@ class Straight(Trial):
 
     given: Linear | None = None
 
-    def at(self, numbers, near=None, noise_factor=None, remainder=None) -> Point:
+    def linearise(self, numbers, near=None, noise_factor=None, remainder=None) -> Point:
         assert self.given is not None
         columns, ref = self.reference.columns, self.reference
         d = np.concatenate((np.zeros(columns.base), columns.numbers(dict(numbers))))
         linear = replace(self.given, e=self.given.e - self.given.j @ d)
         weighed = likelihood.weighed(linear, ref.process_noise)
-        return self._judged(Point(dict(numbers), linear.path, linear, weighed))
+        return self._refuse_divergent(Point(dict(numbers), linear.path, linear, weighed))
 
 
 def trial(made: Campaign, record: Record, given: Linear, fixed: tuple[str, ...] = ()) -> Straight:
     """One of equal weights that was linearised where nothing has changed."""
-    found = Straight.of(made, record, fixed, given=given)
-    return replace(found, first=found.at({}))
+    found = Straight.build(made, record, fixed, given=given)
+    return replace(found, first=found.linearise({}))
 
 
 def no_hull(_: Fit) -> SideForce:

@@ -12,10 +12,18 @@ ROOT = Path(__file__).parents[1]
 HOST = """
 import os, sys, threading
 from dataclasses import dataclass
+from pathlib import Path
 import jax, jax.numpy as jnp, numpy as np
 
-OURS = {"NPROC", "JAX_COMPILATION_CACHE_DIR", "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"}
+def settings():
+    return {name: jax.config._read(name) for name in jax.config.values}
 
+OTHERS = ("_RJEM_MALLOC_CONF", "KMP_DUPLICATE_LIB_OK")  # of polars, of threadpoolctl
+
+def variables():
+    return {name: value for name, value in os.environ.items() if name not in OTHERS}
+
+environment, before = variables(), settings()
 def precision():
     return jnp.ones(1).dtype.name, (jnp.arange(3) / 3).dtype.name, jax.config.jax_enable_x64
 
@@ -25,7 +33,7 @@ import shiplog
 shiplog.diagnose  # loads all that it needs
 from shiplog.diagnosis.linear import linearisation
 from shiplog.simulation import sensitivities
-assert precision() == single and not OURS & os.environ.keys()
+assert precision() == single and (variables(), settings()) == (environment, before)
 
 @jax.tree_util.register_static
 @dataclass(frozen=True)
@@ -58,20 +66,56 @@ assert np.abs(slopes[0, :, 1, 0] + i * (1 - k) ** (i - 1.0)).max() < 1e-13
 assert along[0, 0].tolist() == [-k, 0.0, 0.0]
 every = (states, slopes, along, normal.loss, normal.pull, normal.gram)
 assert {type(a) for a in every} == {np.ndarray} and {a.dtype.name for a in every} == {"float64"}
-assert seen == {single} and precision() == single and not OURS & os.environ.keys()
+assert seen == {single} and precision() == single
+assert (variables(), settings()) == (environment, before)
+jax.jit(lambda x: 3 * x)(jnp.ones(2)).block_until_ready()  # the host's own is not shiplog's to keep
+print(len(compiled := list(Path(os.environ["XDG_CACHE_HOME"]).rglob("jax/*-cache"))))
+assert not [path for path in compiled if "lambda" in path.name], compiled
 """
 
 
-def test_a_host_in_single_precision_stays_so_while_shiplog_computes_in_double(tmp_path):
+def hosted(folder, program=HOST, **variables):
+    """What a program printed that imports shiplog, with an empty environment and this cache."""
     done = subprocess.run(
-        [sys.executable, "-c", HOST],
+        [sys.executable, "-c", program],
         cwd=ROOT,
-        env={"PATH": "/usr/bin:/bin", "XDG_CACHE_HOME": str(tmp_path)},
+        env={"PATH": "/usr/bin:/bin", "XDG_CACHE_HOME": str(folder), **variables},
         capture_output=True,
         text=True,
         check=False,
     )
     assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_a_host_in_single_precision_stays_so_while_shiplog_computes_in_double(tmp_path):
+    """And what shiplog compiles, but not what its host does, is kept for the next process."""
+    first, again = hosted(tmp_path), hosted(tmp_path)
+    assert int(first) >= 3  # functions: rollouts with derivatives, normal equations, accelerations
+    assert again == first
+
+
+def test_a_host_with_a_folder_of_its_own_for_compiled_functions_keeps_it(tmp_path):
+    own = {"JAX_COMPILATION_CACHE_DIR": str(tmp_path / "own")}
+    own["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0"
+    assert int(hosted(tmp_path, **own)) == 0
+    assert len(list((tmp_path / "own").glob("*-cache"))) >= 3
+
+
+BEFORE_JAX = """
+import os, sys
+import shiplog
+assert "jax" not in sys.modules
+shiplog.open_store
+changed = {n for n in os.environ if n.startswith(("JAX", "XLA", "OMP", "OPENBLAS", "NPROC"))}
+import jax
+assert not changed and jax.config.jax_compilation_cache_dir is None
+assert jax.config.jax_persistent_cache_min_compile_time_secs == 1.0  # JAX's own
+"""
+
+
+def test_a_host_that_imports_jax_later_finds_jaxs_own_settings(tmp_path):
+    hosted(tmp_path, BEFORE_JAX)
 
 
 @pytest.mark.parametrize("switch", ('"jax_enable_x64"', '"NPROC"'))

@@ -11,7 +11,7 @@ from shiplog.diagnosis.hypotheses.hypothesis import Hypothesis
 from shiplog.diagnosis.hypotheses.search import Search
 from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
-from shiplog.diagnosis.trial.fitted import Found
+from shiplog.diagnosis.trial.fitted import Estimate
 
 SIZE = 0.5  # of every number, where none is given: what matters is 0.1 and, of one, 0.4
 
@@ -48,12 +48,12 @@ def search(
     given = {((), NOMINAL): 1e-12, **probability}
     for (labels, kind), p in given.items():
         numbers = {
-            n: np.full(len(columns.of[n]), (sizes or {}).get(n, SIZE)) for n in sorted(labels)
+            n: np.full(len(columns.indices[n]), (sizes or {}).get(n, SIZE)) for n in sorted(labels)
         }
         count = sum(map(len, numbers.values()))
         output = (evidence or {}).get((labels, kind), 100.0 * len(labels))
         noise = raised if kind == RAISED else 1.0
-        found = Found("+".join(labels), output, noise, numbers, spread**2 * np.eye(count))
+        found = Estimate("+".join(labels), output, noise, numbers, spread**2 * np.eye(count))
         remainder = Remainder(kind, 3.0)
         if kind == INTERMITTENT:
             beyond = np.sqrt(raised**2 - 1.0) * of.reference.process_noise.acceleration

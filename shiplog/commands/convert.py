@@ -116,7 +116,7 @@ def draft(path: Path, vessel: str | None = None) -> str:
     with said, packed.unpacked(path) as source:
         if not path.exists() or is_log(source):
             return draft_log(source, vessel)
-        if formats.of(source) is table_rows.FORMAT:
+        if formats.recognise(source) is table_rows.FORMAT:
             table_rows.refuse_others(source)
             return draft_table(source, vessel)
         found = look_into(source) if source.is_dir() and not is_bag(source) else Folder()
@@ -163,4 +163,4 @@ def _each(
             yield from _each(table, profile, out, done)
         if not trips:
             one = Original(source, path, profile, out, done.refused, done.lost, times)
-            yield from formats.of(source).logs(one)
+            yield from formats.recognise(source).logs(one)

@@ -93,9 +93,9 @@ def diagnose_run(
     before_effect = not parts.overlapping(names, run.trained_on) and not run.given
     nominal = _nominal(run, store, profile) if before_effect else None
     if switches.time_scale:
-        nominal, recorded = trial_voyages.in_ship_time(run, nominal, recorded)
+        nominal, recorded = trial_voyages.rescale_time(run, nominal, recorded)
     used = [*names, *store.there(run.trained_on)]
-    against = contradicted.of(store, dict.fromkeys(used))
+    against = contradicted.list_contradicted(store, dict.fromkeys(used))
     if contradicted.everywhere(against):
         done = Diagnosis(answer.contradicted(run, recorded, before_effect, against), out)
     elif answer.enough(recorded):
@@ -182,7 +182,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> Diagnosis:
     external, out_of_reach = error_location.find_external_forces(
         tried, decided.point, whole, decision.fit.remainder, nominal
     )
-    tried = tried.leaving_out(out_of_reach)
+    tried = tried.leave_out(out_of_reach)
     judge = None if judge is None else replace(judge, trial=tried)
     held, network, alone = judge, None, None
     if not run.judges_itself:

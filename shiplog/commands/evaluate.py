@@ -100,7 +100,7 @@ def evaluate_runs(
         baseline_losses=_baseline_losses(first, cut),
         inside=_inside(scored, bands, cut),
         forces=_forces(opened, rows),
-        contradicted=contradicted.of(store, names),
+        contradicted=contradicted.list_contradicted(store, names),
         ship_time=ship_time.of(first.profile.ship.length_m, first.training()),
     )
     return replace(found, shown=_shown(found, store))
@@ -344,7 +344,7 @@ def _edges(states: np.ndarray, half: np.ndarray | None) -> dict[str, pl.Series]:
 
 
 def _coverage(run: Run, rows: pl.DataFrame, numbered: pl.DataFrame, size: int) -> pl.DataFrame:
-    covered = covering.of(run.training(), run.profile.actuator_names, run.profile.has_wind)
+    covered = covering.learn(run.training(), run.profile.actuator_names, run.profile.has_wind)
     measured = covered.table(rows, numbered, size)
     whole = numbered.hstack(measured)
     reasons = []

@@ -36,7 +36,7 @@ def train_command(store_path: Path, out: Path, options: TrainOptions) -> Answer:
     assert isinstance(options.window, int)
     split = choose(store, options.voyages, options.validation, options.data, options.window)
     say(split)
-    found = contradicted.of(store, (*split.training, *split.validation))
+    found = contradicted.list_contradicted(store, (*split.training, *split.validation))
     warning = refuse_contradicted(found, options.unchecked)
     physical = MODELS[options.model].family is PHYSICS
     profiles = [store.profile([name]) for name in (*split.training, *split.validation)]

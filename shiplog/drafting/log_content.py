@@ -96,7 +96,7 @@ class Log:
 
         return sorted(choices, key=key)
 
-    def between(self, topic: str, path: str) -> str:
+    def describe_change(self, topic: str, path: str) -> str:
         """A line for a value that is sent when it changes: it holds until the next one."""
         frame, number = self.data.get(topic), self.column(topic, path).to_numpy()
         if frame is None or len(number) < FEW:

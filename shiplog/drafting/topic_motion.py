@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,7 +15,6 @@ METRE = 111_320.0  # m, a degree of latitude
 FULL_TURN_RAD = 6.3  # an angle that never passes it, of a ship that turns, may be in radians
 TURNED = 0.2  # of an angle's values, the range from the 5 % to the 95 % quantile: rad or deg
 NOTHING = np.zeros(0)
-Columns = Callable[[str], np.ndarray]  # a field's name to its numbers
 
 
 @dataclass(frozen=True)

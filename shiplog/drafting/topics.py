@@ -276,7 +276,7 @@ def _actuator(kind: str, topic: str, path: str, fallback: str, names: set[str], 
         f'[[actuators]]\nname = "{name}"\nkind = "{kind}"\n'
         f"topic = {quoted(topic)}  # {ordered}{log.rate(topic)}\n"
         f'field = {quoted(path)}  # {log.values(topic, path)}\nunit = "{unit or fallback}"{check}\n'
-        f"{log.between(topic, path)}"
+        f"{log.describe_change(topic, path)}"
         f"{particulars.of_actuator(kind, unit or fallback, most)}"
     )
 

@@ -1,1 +1,1 @@
-"""The computer: files, paths, caches, limits of reading, faults nobody foresaw."""
+"""The computer: files, paths, caches, child processes, limits of reading, faults nobody foresaw."""

@@ -24,16 +24,28 @@ def folder() -> Path:
 
 
 def keep_compiled() -> None:
-    """Let JAX keep on disk what it compiles, unless the user has set another folder: later
-    processes save some ten seconds a ship. A process that used JAX trims the cache when it ends.
+    """In a process of shiplog's own: let JAX, and that of its child processes, keep on disk what it
+    compiles, unless the user has set another folder: later processes save some ten seconds a ship.
+    A process that used JAX trims the cache when it ends.
 
-    JAX has one such folder a process, and reads its name once. Where it is imported already, it is
-    somebody else's, and nothing is set.
+    A process of somebody else's keeps its settings; there `jit_cache.kept_on_disk` does it.
     """
-    if "jax" not in sys.modules:
-        os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(folder() / "jax"))
-        os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
-    atexit.unregister(_trim_after_jax)  # once, however often this is called
+    for name, value in kept_by_jax().items():
+        os.environ.setdefault(name.upper(), str(value))
+    trim_when_done()
+
+
+def kept_by_jax() -> dict[str, str | float]:
+    """JAX's settings by which it keeps all that it compiles."""
+    return {
+        "jax_compilation_cache_dir": str(folder() / "jax"),
+        "jax_persistent_cache_min_compile_time_secs": 0.0,
+    }
+
+
+def trim_when_done() -> None:
+    """When the process ends, however often this is called."""
+    atexit.unregister(_trim_after_jax)
     atexit.register(_trim_after_jax)
 
 
@@ -59,11 +71,6 @@ def sizes() -> dict[str, tuple[int, int]]:
         count, total = found.get(kind, (0, 0))
         found[kind] = (count + 1, total + bytes_)
     return found
-
-
-def size() -> int:
-    """Bytes of all files."""
-    return sum(bytes_ for _, bytes_, _ in files())
 
 
 def trim(limit: int = LIMIT) -> int:

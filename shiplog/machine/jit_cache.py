@@ -7,15 +7,18 @@ that no array of double precision is computed with in single precision afterward
 
 JAX needs seconds to trace a ship's equations with their derivatives, and milliseconds to load
 what it has traced before. All that a trace depends on is in its key, this program's source with
-it; equations that others wrote (a cause of the user's own) are traced anew each time.
+it; equations that others wrote (a cause of the user's own) are traced anew each time. What JAX
+compiles it keeps in shiplog's folder, too, while a function of shiplog's is compiled and no longer:
+a process that imports shiplog has the environment and the settings of JAX that it had.
 """
 
 from __future__ import annotations
 
 import hashlib
 import logging
-from collections.abc import Callable, Hashable, Mapping
-from contextlib import AbstractContextManager
+import threading
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import fields, is_dataclass
 from typing import Any
 
@@ -23,6 +26,7 @@ import jax
 import numpy as np
 from jax import export
 from jax.core import Tracer
+from jax.experimental.compilation_cache import compilation_cache
 
 from shiplog.machine import disk_cache, files
 
@@ -31,12 +35,59 @@ log = logging.getLogger(__name__)
 # The emitters of fused loops need twice the time to compile a ship's derivatives, and what they
 # compile is no faster. Measured with `python -m pipelines.experiments.benchmarks.compiling`.
 COMPILER = {"xla_cpu_use_fusion_emitters": False}
+FOLDER = "jax_compilation_cache_dir"
+LEAST_BYTES = (
+    "jax_persistent_cache_min_entry_size_bytes"  # which JAX sets where it opens its folder
+)
 
 
 def double() -> AbstractContextManager:
     """JAX in double precision, in this thread and until the block ends: float32 sensitivities do
     not distinguish causes."""
     return jax.enable_x64(True)
+
+
+class _Kept:
+    """JAX's folder for what it compiles. It is one of the process, and JAX looks at its name once:
+    so it is set while any thread is in the block, and what JAX knows of it is forgotten twice. A
+    process that has such a folder keeps its own (the command line sets shiplog's).
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._inside = 0
+        self._before: dict[str, Any] = {}
+
+    @contextmanager
+    def __call__(self) -> Iterator[None]:
+        with self._lock:
+            if not self._inside and getattr(jax.config, FOLDER) is None:
+                self._set()
+            self._inside += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._inside -= 1
+                if not self._inside and self._before:
+                    self._restore()
+
+    def _set(self) -> None:
+        wanted = disk_cache.kept_by_jax()
+        self._before = {name: getattr(jax.config, name) for name in (*wanted, LEAST_BYTES)}
+        for name, value in wanted.items():
+            jax.config.update(name, value)
+        compilation_cache.reset_cache()
+        disk_cache.trim_when_done()
+
+    def _restore(self) -> None:
+        for name, value in self._before.items():
+            jax.config.update(name, value)
+        self._before = {}
+        compilation_cache.reset_cache()
+
+
+kept_on_disk = _Kept()
 
 
 class Traced:
@@ -55,9 +106,13 @@ class Traced:
         shapes = tuple((leaf.shape, str(leaf.dtype)) for leaf in leaves)
         key = (tree, shapes, tuple(sorted(static.items())))
         with double():
-            if key not in self._known:
-                self._known[key] = self._compiled(tree, leaves, static, repr(key))
-            return jax.tree.map(np.asarray, self._known[key](*leaves))
+            if (known := self._known.get(key)) is not None:
+                return jax.tree.map(np.asarray, known(*leaves))
+            with kept_on_disk():  # JAX compiles at the first call
+                made = self._compiled(tree, leaves, static, repr(key))
+                found = jax.tree.map(np.asarray, made(*leaves))
+            self._known[key] = made
+            return found
 
     def _compiled(
         self, tree: Any, leaves: list, static: Mapping[str, Hashable], key: str

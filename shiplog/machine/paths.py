@@ -85,7 +85,7 @@ def check_there(path: Path, what: str) -> None:
 def check_writable(path: Path, option: str) -> None:
     """Raises ShiplogError where there can be no folder of this name to write into."""
     try:
-        there = path if path.exists() else _above(path)
+        there = path if path.exists() else _existing_parent(path)
         good = there.is_dir() and os.access(there, os.W_OK)
         why = "is not writable" if there.is_dir() else "is a file, not a folder"
     except OSError as error:  # a name that is too long
@@ -205,6 +205,6 @@ def check_causes(paths: Sequence[Path]) -> None:
             )
 
 
-def _above(path: Path) -> Path:
+def _existing_parent(path: Path) -> Path:
     """The nearest folder above that exists."""
     return next((p for p in path.absolute().parents if p.exists()), Path.cwd())

@@ -9,13 +9,11 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from shiplog.exceptions import LogUnreadable
+from shiplog.machine import limits
 
 # Of a small file, and of a large one: memory, of which the libraries alone reserve 0.4 GB on two
 # cores and more on many; and processor time, of which a sound log takes 1 s for a MB on the slower
@@ -49,13 +47,14 @@ def begin(path: Path) -> None:
             hint="if the file is sound, it is too large for this computer: cut it into parts.",
         )
     os.write(watch.pipe, name + b"\0")
-    _limit(size_of(path))
+    grown(path)
 
 
 def grown(path: Path) -> None:
     """What the file that is being read has become: unpacked, it is larger."""
     if watch is not None:
-        _limit(size_of(path))
+        size = size_of(path)
+        limits.set_limits(memory(size), LEAST_S + S_PER_MB * size / 1e6)
 
 
 def end() -> None:
@@ -88,40 +87,3 @@ def size_of(path: Path) -> int:
 def memory(size: int) -> int:
     """Bytes that a process may take for a file of so many."""
     return LEAST_BYTES + BYTES_PER_BYTE * size
-
-
-@contextmanager
-def lifted() -> Iterator[None]:
-    """No limits in a block: a process that is started there sets its own."""
-    if sys.platform != "linux":
-        yield
-        return
-    import resource
-
-    kinds = (resource.RLIMIT_DATA, resource.RLIMIT_CPU)
-    before = [resource.getrlimit(kind) for kind in kinds]
-    for kind, (_, hard) in zip(kinds, before, strict=True):
-        resource.setrlimit(kind, (hard, hard))
-    try:
-        yield
-    finally:
-        for kind, limits in zip(kinds, before, strict=True):
-            resource.setrlimit(kind, limits)
-
-
-def _limit(size: int) -> None:
-    """Soft limits, so that the next file's may be higher. The processor time counts from now."""
-    if sys.platform != "linux":
-        return
-    import resource
-
-    used = sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
-    seconds = int(used + LEAST_S + S_PER_MB * size / 1e6) + 1
-    for kind, most in (
-        (resource.RLIMIT_DATA, memory(size)),
-        (resource.RLIMIT_CPU, seconds),
-    ):
-        _, hard = resource.getrlimit(kind)
-        resource.setrlimit(
-            kind, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard)
-        )

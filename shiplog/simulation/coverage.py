@@ -48,7 +48,7 @@ class Coverage:
         features = (_features(seconds, self.names) - self.mean) / self.std
         return np.asarray(self.tree.query(features)[0]) / self.limit
 
-    def outside(self, seconds: pl.DataFrame) -> dict[str, np.ndarray]:
+    def mark_outside(self, seconds: pl.DataFrame) -> dict[str, np.ndarray]:
         """Per channel, which rows [n] fall into histogram bins that training left empty."""
         result = {}
         for j, name in enumerate((*(c.name for c in VELOCITY), *self.actuators)):
@@ -65,7 +65,7 @@ class Coverage:
         seconds is the sorted 1 Hz table that the plan (voyage, segment, start) was made from.
         """
         inside = self.distance(seconds) <= 1.0
-        outside = self.outside(seconds)
+        outside = self.mark_outside(seconds)
         first = seconds.with_row_index("row").group_by("voyage", "segment").agg(pl.col("row").min())
         plan = windows.join(first, on=["voyage", "segment"], how="left", maintain_order="left")
         begin = (plan["row"].cast(pl.Int64) + plan["start"]).to_numpy()
@@ -74,7 +74,7 @@ class Coverage:
         return pl.DataFrame({"coverage": inside[rows].mean(1), **shares})
 
 
-def of(training: pl.DataFrame, actuators: Sequence[str], has_wind: bool) -> Coverage:
+def learn(training: pl.DataFrame, actuators: Sequence[str], has_wind: bool) -> Coverage:
     """Learn where the training seconds [n] are. Columns: velocities, actuators, wind."""
     wind = ("wind_ahead", "wind_starboard") if has_wind else ()
     names = (*(c.name for c in VELOCITY), *actuators, *wind)

@@ -161,7 +161,7 @@ class Extension:
         return facts, arrays | {"coefficients": simulator.theta[:base] if bent is None else bent}
 
     @staticmethod
-    def of(
+    def from_record(
         facts: Mapping, arrays: Mapping[str, np.ndarray], own: Sequence[Cause] = ()
     ) -> Extension:
         """Back again; `own`: causes of the user's own. Raises RunError for one nobody knows, and

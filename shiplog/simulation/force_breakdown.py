@@ -11,7 +11,7 @@ from shiplog.ship_profile.profile import Profile
 from shiplog.simulation.sensitivities import Simulator, true_wind
 
 
-def along(simulator: Simulator, seconds: pl.DataFrame, profile: Profile) -> pl.DataFrame:
+def break_down(simulator: Simulator, seconds: pl.DataFrame, profile: Profile) -> pl.DataFrame:
     """Part by part at every measured second: voyage, time, part, surge [N], sway [N], yaw [N m].
 
     seconds   the 1 Hz table with `elapsed`; the forces are those at the measured motion

@@ -98,12 +98,12 @@ def test_diagnose_says_it_first_and_names_no_cause(store, published, tmp_path, w
 def test_a_contradiction_of_a_short_stretch_bars_the_causes_of_its_channel_alone(store, tmp_path):
     """4 of 80 s: a twentieth."""
     there = Store(planted(store, tmp_path, "trip_3", start_s=10.0, end_s=14.0))
-    (one,) = contradicted.of(there, ["trip_3"])
+    (one,) = contradicted.list_contradicted(there, ["trip_3"])
     assert one.share == pytest.approx(0.05, rel=0.05)
     assert contradicted.everywhere([one]) == ()
-    (half,) = contradicted.of(there, ["trip_3[0:40]"])
+    (half,) = contradicted.list_contradicted(there, ["trip_3[0:40]"])
     assert half.share == pytest.approx(0.1, rel=0.05)
-    assert contradicted.of(there, ["trip_3[40:80]"]) == ()
+    assert contradicted.list_contradicted(there, ["trip_3[40:80]"]) == ()
     profile = there.profile(["trip_3"])
     barred = contradicted_causes.barred_causes(["wind"], profile)
     assert set(barred) == {

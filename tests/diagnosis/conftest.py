@@ -29,7 +29,7 @@ def made():
         nominal, straight.passed(nominal, columns, sensitivity=0.3), columns, share=SHARE
     )
     numbers = np.zeros(columns.linearised)
-    numbers[columns.of["drag"]] = DRAG
+    numbers[columns.indices["drag"]] = DRAG
     given = straight.passed(record, columns, numbers, seed=2, sensitivity=0.3)
     return nominal, record, given
 

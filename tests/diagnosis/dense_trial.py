@@ -24,14 +24,14 @@ def gaussian(trial, point, noise, included=(), families=(), size=1.0, parts=None
     e, nominal, extra, change, blocks = [], [], [], [], []
     cut, linear = point.linear.cut, point.linear
     observed = ref.misfit.accelerations(cut, trial.grid)
-    unseen = trial.unseen.accelerations(cut, trial.grid)
+    unseen = trial.omitted.accelerations(cut, trial.grid)
     for s, (error, j, z, c) in enumerate(straight.dense(linear, PROCESS_NOISE.times(noise))):
         unit = columns.unit[: j.shape[1]]
         both = np.concatenate((j * unit, z @ observed[s]), 1)
         every = np.concatenate((both, z @ unseen[s]), 1)
         e.append(error)
         nominal.append(both)
-        extra.append(both[:, [i for n in included for i in columns.of[n]]])
+        extra.append(both[:, [i for n in included for i in columns.indices[n]]])
         change.append(every[:, [i for n in families for i in trial.families[n]]])
         blocks.append(c)
     whole_e, j = np.concatenate(e), np.concatenate(nominal)
@@ -44,8 +44,8 @@ def gaussian(trial, point, noise, included=(), families=(), size=1.0, parts=None
         inside = np.concatenate([np.arange(s * rows, (s + 1) * rows) for s in part])
         covariance[np.ix_(inside, inside)] += (j[inside] * deviation**2) @ j[inside].T
     x, d = np.concatenate(extra), np.concatenate(change)
-    stood = [-np.asarray(point.numbers.get(n, np.zeros(len(columns.of[n]))))
-             / columns.unit[columns.of[n]] for n in included]  # fmt: skip
+    stood = [-np.asarray(point.numbers.get(n, np.zeros(len(columns.indices[n]))))
+             / columns.unit[columns.indices[n]] for n in included]  # fmt: skip
     before = np.concatenate([*stood, np.zeros(0)])
     return (
         whole_e, j, x, d, covariance, mean, nominal_covariance, before, size, count,

@@ -7,7 +7,12 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from shiplog.diagnosis.noise.bounds import log_on_board, log_share, on_board, within
+from shiplog.diagnosis.noise.bounds import (
+    bounded_mode,
+    log_share,
+    log_share_on_board,
+    mode_on_board,
+)
 
 
 def test_a_number_held_at_a_bound_moves_the_others():
@@ -17,15 +22,15 @@ def test_a_number_held_at_a_bound_moves_the_others():
     unit = np.array([1.0, 1e-3])
     covariance = np.array([[1.0, 0.6], [0.6, 1.0]]) * np.outer(unit, unit)
     low, high = np.zeros(2), np.full(2, np.inf)
-    found = within(np.array([3.0, -2e-3]), covariance, low, high)
+    found = bounded_mode(np.array([3.0, -2e-3]), covariance, low, high)
     assert found == pytest.approx([4.2, 0.0], abs=1e-9)
     inside = np.array([3.0, 2e-3])
-    assert within(inside, covariance, low, high) is inside
+    assert bounded_mode(inside, covariance, low, high) is inside
     apart = np.array([[1.0, 0.9], [0.9, 1.0]])
     lost = np.array([np.nan, -1.0])
-    assert within(lost, covariance, low, high) is lost
-    assert within(mean := -np.ones(2), np.full((2, 2), np.inf), low, high) is mean
-    freed = within(np.array([-0.1, -2.0]), apart, low, high)
+    assert bounded_mode(lost, covariance, low, high) is lost
+    assert bounded_mode(mean := -np.ones(2), np.full((2, 2), np.inf), low, high) is mean
+    freed = bounded_mode(np.array([-0.1, -2.0]), apart, low, high)
     assert freed == pytest.approx([-0.1 + 0.9 * 2.0, 0.0], abs=1e-9)
 
 
@@ -73,11 +78,11 @@ def test_a_load_beyond_the_ship_is_moved_onto_it():
     def off(point):
         return float((point - mean) @ inverse @ (point - mean))
 
-    found = on_board(mean, covariance, 1.5, at=1)
+    found = mode_on_board(mean, covariance, 1.5, at=1)
     assert found[2] == pytest.approx(1.5 * found[1])
     for way in (np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 1.5])):
         assert off(found) < min(off(found + 0.01 * way), off(found - 0.01 * way))
-    assert (on_board(mean, covariance, 2.1, at=1) == mean).all()
+    assert (mode_on_board(mean, covariance, 2.1, at=1) == mean).all()
 
 
 def test_what_a_load_on_board_adds_is_the_share_of_draws_that_are():
@@ -90,10 +95,10 @@ def test_what_a_load_on_board_adds_is_the_share_of_draws_that_are():
 
     after = share(rng.multivariate_normal(mean, covariance, 200_000))
     before = share(size * rng.standard_normal((200_000, 2)))
-    found = log_on_board(mean, covariance, size, 1.5)
+    found = log_share_on_board(mean, covariance, size, 1.5)
     assert found == pytest.approx(np.log(after / before), abs=0.02)
     assert np.arctan(3.0) * 2.0 / np.pi == pytest.approx(before, abs=0.01)
     # far outside it is the tail beyond the nearer line: 23 of 1.5 · 4 ± 1.5
-    far = log_on_board(np.array([4.0, 23.0]), np.diag([2.25, 1.0]), size, 1.5)
+    far = log_share_on_board(np.array([4.0, 23.0]), np.diag([2.25, 1.0]), size, 1.5)
     lost = 0.5 * 17.0**2 / (1.0 + 2.25**2)
     assert -lost - 5.0 < far < -lost

@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from shiplog.diagnosis.nominal.campaign_prior import INFORMATION_SHARES, learn, of_voyages, prior
+from shiplog.diagnosis.nominal.campaign_prior import (
+    INFORMATION_SHARES,
+    learn,
+    prior,
+    reduce_voyages,
+)
 from shiplog.diagnosis.nominal.voyage_effects import VoyageEffects, reduced
 
 EACH = np.arange(12)  # parts that are voyages of their own
@@ -105,7 +110,7 @@ def test_products_of_voyages_are_those_of_a_dense_covariance(apart):
     voyages, deviation = np.array([0, 1, 1, 2]), np.array([0.5, 0.0, 2.0])
     drawn = [rng.standard_normal((12, 4)) for _ in voyages]
     parts = [both.T @ both for both in drawn]
-    found, volumes = of_voyages(parts, voyages, apart * deviation, deviation)
+    found, volumes = reduce_voyages(parts, voyages, apart * deviation, deviation)
     for name, gram, volume in zip((0, 1, 2), found, volumes, strict=True):
         own = [both for both, of in zip(drawn, voyages, strict=True) if of == name]
         both, j = np.concatenate(own), block_diag(*(one[:, 1:] * deviation for one in own))

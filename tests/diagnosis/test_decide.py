@@ -71,7 +71,7 @@ def test_two_names_each_with_its_own_part_of_the_covariance(trial, monkeypatch):
     """And with the form error of its own numbers, 2 % of them unless it is said to be none."""
     made = weighed.search(trial, {(("drag", "two"), NOMINAL): 1.0})
     whole = np.array([[4.0, 1.0, 2.0], [1.0, 9.0, 3.0], [2.0, 3.0, 16.0]])
-    made.table.found[("drag", "two"), NOMINAL].found.covariance[:] = whole
+    made.table.found[("drag", "two"), NOMINAL].estimate.covariance[:] = whole
     decision, _ = decide(made)
     assert named(decision) == ["drag", "two"]
     drag, two = decision.named

@@ -1,5 +1,7 @@
 """Parts of the decision that are left out: what each decides is then decided without it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import weighed
@@ -24,6 +26,29 @@ def test_without_practical_sizes_every_size_counts(trial, acts, probability):
     made = weighed.search(trial, given, sizes={"drag": 0.01}, spread=1e-4)
     made.table.parts = Parts(practical_size=acts)
     assert posteriors.posterior(made).names.get("drag", 0.0) == pytest.approx(probability)
+
+
+@pytest.mark.parametrize(("acts", "verdict"), [(True, "none"), (False, "named")])
+def test_a_cause_that_is_there_but_does_not_matter_is_a_trace(trial, acts, verdict):
+    """Its number is known a hundred times better than it has to be to matter: a tenth of what does
+    is certain to be there, and is nothing to act on."""
+    given = {(DRAG, NOMINAL): 0.99, ((), NOMINAL): 0.01}
+    made = weighed.search(trial, given, sizes={"drag": 0.01}, spread=1e-4)
+    made.table.parts = Parts(practical_size=acts)
+    decision = decide(made)[0]
+    assert decision.verdict == verdict
+    told = decision.traces if acts else decision.named
+    assert [one.cause.name for one in told] == ["drag"]
+
+
+@pytest.mark.parametrize(("acts", "verdict"), [(True, "none"), (False, "unknown")])
+def test_voyages_of_all_weathers_make_a_trial_of_any_of_them_an_ordinary_one(trial, acts, verdict):
+    """Process noise differs by a factor of e^0.6 = 1.8 from nominal voyage to nominal voyage: a
+    trial with twice the nominal noise is as they are."""
+    of = replace(trial, campaign=replace(trial.campaign, noise=0.6))
+    made = weighed.search(of, {((), RAISED): 1.0}, raised=2.0)
+    made.table.parts = Parts(ordinary_spreads=acts)
+    assert decide(made)[0].verdict == verdict
 
 
 @pytest.mark.parametrize(

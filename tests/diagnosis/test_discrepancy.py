@@ -10,7 +10,7 @@ import straight
 
 from shiplog.diagnosis.linear.segment_nodes import Nodes
 from shiplog.diagnosis.noise import discrepancy
-from shiplog.diagnosis.noise.discrepancy import SEEN, UNSEEN, WAVES
+from shiplog.diagnosis.noise.discrepancy import MODELLED, OMITTED, WAVES
 from shiplog.ship_profile import file as profiles
 from shiplog.ship_profile.profile import Profile
 
@@ -80,7 +80,7 @@ def products(name: str, of: Profile, at: Nodes) -> np.ndarray:
 
 
 def one(name: str, of: Profile, *at: Nodes) -> discrepancy.Family:
-    (family,) = discrepancy.of(of, ACCELERATION, 0, (name,), *at).families
+    (family,) = discrepancy.build(of, ACCELERATION, 0, (name,), *at).families
     return family
 
 
@@ -119,8 +119,8 @@ def test_a_rudder_is_hard_over_at_the_larger_of_its_limits():
         actuator("one", "rudder", limits=[-45.0, 40.0]) + actuator("other", "rudder")
         + actuator("screw", "propeller")
     )  # fmt: skip
-    assert discrepancy.hard_over(of.actuators[0]) == pytest.approx(math.radians(45.0))
-    assert discrepancy.hard_over(of.actuators[1]) == pytest.approx(math.radians(35.0))
+    assert discrepancy.largest_angle(of.actuators[0]) == pytest.approx(math.radians(45.0))
+    assert discrepancy.largest_angle(of.actuators[1]) == pytest.approx(math.radians(35.0))
 
 
 def test_a_rudder_that_stops_short_is_a_function_of_its_angle():
@@ -149,8 +149,8 @@ def test_an_azimuth_turns_the_thruster_at_its_own_place():
         + actuator("bow", "thruster", (1.5, 0.0))
         + actuator("tunnel", "thruster", (1.0, 0.0))
     )
-    assert discrepancy.driven_by(of, 0, [1, 3, 4]) == [3]
-    assert discrepancy.driven_by(of, 2, [1, 3, 4]) == [1]
+    assert discrepancy.driving_units(of, 0, [1, 3, 4]) == [3]
+    assert discrepancy.driving_units(of, 2, [1, 3, 4]) == [1]
     given = np.array([[[0.5, 2.0, -0.7, 3.0, 1.0]]])
     found = products("controls", of, nodes(np.zeros((1, 1, 6)), given))[0, 0]
     # three thrusters of two products each, then four of each angle
@@ -166,7 +166,7 @@ def test_a_rudder_turns_two_screws_at_most():
         "".join(actuator(f"screw_{i}", "propeller", (0.0, i)) for i in (1, 2, 3))
         + actuator("rudder", "rudder", (-1.5, 0.0))
     )
-    assert discrepancy.driven_by(of, 3, [0, 1, 2]) == [0, 1]
+    assert discrepancy.driving_units(of, 3, [0, 1, 2]) == [0, 1]
 
 
 def test_wind_goes_with_its_square_and_harmonics_of_its_angle():
@@ -188,7 +188,7 @@ def test_features_have_unit_size_together_in_each_channel():
     """Weights of unit variance make an acceleration of unit variance, on average over nodes: a
     family's size is in units of the process noise."""
     at = nodes(seed=1)
-    for name in (*SEEN, *UNSEEN):
+    for name in (*MODELLED, *OMITTED):
         family = one(name, TWIN, at)
         features = family.features(at)
         assert features.shape == (4, 5, 3, len(family.columns))
@@ -210,9 +210,9 @@ def test_weights_are_channel_by_channel():
 
 def test_only_what_no_model_has_is_taken_from_its_mean():
     at = nodes(seed=3)
-    for name in SEEN:
+    for name in MODELLED:
         assert (one(name, TWIN, at).level == 0.0).all()
-    for name in UNSEEN:
+    for name in OMITTED:
         family = one(name, TWIN, at)
         features = discrepancy.features(name, TWIN, family.waves, at)
         even = discrepancy.EVEN[name]
@@ -287,22 +287,22 @@ def test_families_whose_inputs_do_not_vary_are_absent():
     still = np.zeros((4, 5, 6))
     still[..., 1] = 0.5
     calm = nodes(still, np.full((4, 5, 3), 0.2), np.full((4, 5, 1), 0.5), np.full((4, 5, 2), 1.5))
-    assert discrepancy.of(TWIN, ACCELERATION, 0, (*SEEN, *UNSEEN), calm).families == ()
+    assert discrepancy.build(TWIN, ACCELERATION, 0, (*MODELLED, *OMITTED), calm).families == ()
     # what varies between campaigns is there, though each by itself is still
     later = Nodes(calm.state + 0.1, calm.driven)
-    found = discrepancy.of(TWIN, ACCELERATION, 0, (*SEEN, *UNSEEN), calm, later)
+    found = discrepancy.build(TWIN, ACCELERATION, 0, (*MODELLED, *OMITTED), calm, later)
     assert [f.name for f in found.families] == [
         "motion", "controls", "wind", "position", "heading"
     ]  # fmt: skip
     moving = nodes(rng.standard_normal((4, 5, 6)))
-    whole = discrepancy.of(TWIN, ACCELERATION, 0, (*SEEN, *UNSEEN), moving)
-    assert [f.name for f in whole.families] == [*SEEN, *UNSEEN]
+    whole = discrepancy.build(TWIN, ACCELERATION, 0, (*MODELLED, *OMITTED), moving)
+    assert [f.name for f in whole.families] == [*MODELLED, *OMITTED]
 
 
 def test_a_ship_without_a_wind_sensor_has_no_family_of_the_wind():
     of = profile(actuator("screw", "propeller"), wind=False)
     at = nodes(controls=np.random.default_rng(6).standard_normal((4, 5, 1)))
-    names = [f.name for f in discrepancy.of(of, ACCELERATION, 0, SEEN, at).families]
+    names = [f.name for f in discrepancy.build(of, ACCELERATION, 0, MODELLED, at).families]
     assert names == ["motion", "controls"]
 
 
@@ -316,7 +316,7 @@ def test_a_feature_that_hardly_varies_is_not_blown_up():
 
 def test_columns_follow_and_accelerations_are_in_units_of_the_process_noise(monkeypatch):
     at = nodes(seed=8)
-    found = discrepancy.of(TWIN, ACCELERATION, 7, SEEN, at)
+    found = discrepancy.build(TWIN, ACCELERATION, 7, MODELLED, at)
     columns = np.concatenate([f.columns for f in found.families])
     assert columns.tolist() == list(range(7, 7 + found.count))
 
@@ -333,7 +333,7 @@ def test_a_wind_force_of_another_size_and_an_anemometer_of_another_scale_are_one
     """A wind that is 1.2 times weaker has 1/1.2² of the force, and so of each product of U_A² with
     an angle: what the model gets wrong must not tell the two apart."""
     at = nodes(state=np.zeros((4, 5, 6)), seed=8)
-    found = discrepancy.of(TWIN, ACCELERATION, 0, SEEN, at)
+    found = discrepancy.build(TWIN, ACCELERATION, 0, MODELLED, at)
     driven = at.driven.copy()
     driven[..., -2:] /= 1.2
 
@@ -362,7 +362,7 @@ def test_a_wind_force_of_another_size_and_an_anemometer_of_another_scale_are_one
 
 def test_the_same_ship_has_the_same_features_every_time():
     at = nodes(seed=9)
-    for name in (*SEEN, *UNSEEN):
+    for name in (*MODELLED, *OMITTED):
         one_time, another = one(name, TWIN, at), one(name, TWIN, at)
         assert (one_time.features(at) == another.features(at)).all()
     motion, controls = one("motion", TWIN, at), one("controls", TWIN, at)

@@ -33,7 +33,7 @@ def test_a_step_towards_the_measurement_minimises_the_stated_sum():
     )  # fmt: skip
     wide = Wide(np.full(6, 0.3), np.arange(1.0, 7.0), np.array([0.5, 0.7, 0.9]))
     d, expected = np.array([0.4, -0.2]), rng.standard_normal((segments, 3 * NODES))
-    found = linearisation.ahead(given, d, wide, expected)
+    found = linearisation.predict_path(given, d, wide, expected)
     a_wide = np.repeat(wide.acceleration, NODES)
     for s in range(segments):
         rows = used[s].ravel()
@@ -74,7 +74,7 @@ def test_a_step_of_expectation_maximisation_is_that_of_the_joint_posterior():
     wanted = [(squares[3 + c :: 2].sum() + least) / 4.0 for c in (0, 1)]
     wanted.append((squares[1] + least) / 2.0)
     problem = voyage_effects._EffectsProblem(
-        [voyage_effects._Part.of(g, free) for g in grams], free, known, pull, groups, sized
+        [voyage_effects._Part.select(g, free) for g in grams], free, known, pull, groups, sized
     )
     found, numbers = problem.step(np.log([0.3, 0.7, size]))
     assert np.exp(found) == pytest.approx(wanted)
@@ -111,7 +111,9 @@ def test_cross_validation_on_sums_is_that_on_rows():
     y = x @ rng.standard_normal((3, 3)) * 0.4 + rng.standard_normal((len(folds), 3)) + 2.0
     nodes = omitted_inputs._Nodes(y, x, x, folds, folds)
     unit = x / np.sqrt((x**2).mean(0))
-    assert omitted_inputs._left_out(nodes, x) == pytest.approx(_nested(unit, y, folds), rel=1e-9)
+    assert omitted_inputs._cross_validation_error(nodes, x) == pytest.approx(
+        _nested(unit, y, folds), rel=1e-9
+    )
 
 
 @pytest.mark.parametrize(

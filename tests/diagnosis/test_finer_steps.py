@@ -99,7 +99,7 @@ def test_a_ship_that_needs_no_finer_steps_keeps_its_numbers():
     # the last row of what drives is the share of the campaign, before the wind
     plain = replace(cut, driven=np.delete(cut.driven, 3, axis=-1))
     ((_, filled),) = linearisation.chunks(4)  # as many at a time, so that rounding is the same
-    start, acceleration, driven = map(filled, (at.start, at.at_instants(GRID), plain.driven))
+    start, acceleration, driven = map(filled, (at.start, at.interpolate(GRID), plain.driven))
     states = np.asarray(
         linearisation.states_along(model, theta, start, acceleration, driven, cut.step)
     )[:4]
@@ -162,8 +162,8 @@ def test_numbers_of_each_segment_are_taken_off_it_alone():
 def test_a_path_that_runs_away_does_not_move_and_leaves_the_others_alone():
     cut, at, _ = coasting(segments_on=(2,))
     theta = np.array([7.0])
-    found = linearisation.pulled(Stiff(4), theta, cut, GRID, WIDE, at)
+    found = linearisation.fit_path(Stiff(4), theta, cut, GRID, WIDE, at)
     assert np.array_equal(found.start[2], at.start[2]) and np.isfinite(found.acceleration).all()
     free, _, _ = coasting()
-    alone = linearisation.pulled(Stiff(4), theta, free, GRID, WIDE, at)
+    alone = linearisation.fit_path(Stiff(4), theta, free, GRID, WIDE, at)
     assert found.start[[0, 1, 3]] == pytest.approx(alone.start[[0, 1, 3]], abs=1e-12)

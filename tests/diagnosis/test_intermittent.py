@@ -43,7 +43,7 @@ def passed(force: float):
 
 def left_by(linear, weight):
     none = np.zeros(linear.j.shape[-1])
-    return raised_noise.left_by(linear, none, PROCESS_NOISE, weight, 1.0)
+    return raised_noise.residual(linear, none, PROCESS_NOISE, weight, 1.0)
 
 
 def estimated(linear, weight, reference, at_one_place=None):
@@ -60,18 +60,18 @@ def test_noise_is_raised_in_each_channel_by_as_much_as_was_drawn():
     accelerations = drawn @ np.linalg.cholesky(more.kernel(nodes)).T
     linear = straight.passed(record, straight.columns_of(()), accelerations=accelerations, seed=5)
     left = left_by(linear, np.ones(count))
-    value, remainder = raised_noise.by_channel(left)
+    value, remainder = raised_noise.raise_channels(left)
     assert remainder.kind == RAISED
     assert remainder.channels == pytest.approx(tuple(np.hypot(1.0, drawn_by)), rel=0.1)
     alike = max(left.likelihood(PROCESS_NOISE.times(f)) for f in np.linspace(0.5, 4.0, 50))
-    assert value == pytest.approx(left.likelihood(remainder.in_noise(PROCESS_NOISE)))
+    assert value == pytest.approx(left.likelihood(remainder.apply_to(PROCESS_NOISE)))
     assert value > alike + 10.0
 
 
 def test_nominal_noise_at_one_place_is_raised_with_the_others():
     left = left_by(passed(40.0), np.ones(COUNT))
     nominal = Remainder(INTERMITTENT, intermittent=(0.0, 0.01, 0.004), force_lasts=0.5)
-    _, remainder = raised_noise.by_channel(left, nominal)
+    _, remainder = raised_noise.raise_channels(left, nominal)
     side = (remainder.channels[1] * remainder.channels[2]) ** 0.5
     assert remainder.intermittent == pytest.approx((0.0, 0.01 * side, 0.004 * side))
     assert remainder.force_lasts == pytest.approx(0.5 * remainder.noise_lasts)
@@ -88,10 +88,10 @@ def test_raised_noise_lasts_as_long_as_was_drawn():
     accelerations = drawn @ np.linalg.cholesky(more.kernel(nodes)).T
     linear = straight.passed(record, straight.columns_of(()), accelerations=accelerations, seed=5)
     none = np.zeros(linear.j.shape[-1])
-    left = raised_noise.left_by(linear, none, small, np.ones(count), 1.0)
-    value, remainder = raised_noise.by_channel(left)
+    left = raised_noise.residual(linear, none, small, np.ones(count), 1.0)
+    value, remainder = raised_noise.raise_channels(left)
     assert remainder.noise_lasts == pytest.approx(5.0, rel=0.25)
-    as_long = replace(remainder, noise_lasts=1.0).in_noise(small)
+    as_long = replace(remainder, noise_lasts=1.0).apply_to(small)
     assert value > left.likelihood(as_long) + 10.0
 
 
@@ -122,7 +122,7 @@ def test_a_force_lasts_as_long_as_was_drawn(reference):
         assert found.lasts == pytest.approx(lasts, rel=0.4)
         assert found.force == pytest.approx(20.0, rel=0.2)
         assert found.remainder.force_lasts == found.lasts
-        in_noise = found.remainder.in_noise(PROCESS_NOISE)
+        in_noise = found.remainder.apply_to(PROCESS_NOISE)
         assert in_noise.intermittent_time == pytest.approx(found.lasts * usual)
         assert in_noise.time == PROCESS_NOISE.time
 
@@ -222,7 +222,7 @@ def test_a_device_is_on_where_it_pushes(hull):
     assert intermittent.add_pattern(trial, fit, found) is found
     # it is more probable, with the course's own probability, than one that may act at any time
     always = replace(found.remainder, course=None)
-    assert fit.found.evidence > left_with(trial, always).found.evidence + 50.0
+    assert fit.estimate.evidence > left_with(trial, always).estimate.evidence + 50.0
 
 
 def test_the_times_of_a_device_are_those_of_its_pulses(hull):
@@ -281,10 +281,10 @@ def test_what_is_on_or_off_is_of_the_shape_and_the_prior_of_a_remainder():
     usual = replace(device, force_lasts=1.0), replace(force, force_lasts=1.0)
     assert noise_prior(1.0, 0.2, usual[0]) == noise_prior(1.0, 0.2, usual[1]) - 12.0
     rows = np.array([[20, 30, 40], [60, 70, 80]])
-    runs = device.in_noise(PROCESS_NOISE, rows).runs
+    runs = device.apply_to(PROCESS_NOISE, rows).runs
     assert runs.tolist() == on_off.runs(((30, 60),), rows).tolist()
-    assert device.in_noise(PROCESS_NOISE).runs is None  # its size only
-    assert force.in_noise(PROCESS_NOISE, rows).runs is None
+    assert device.apply_to(PROCESS_NOISE).runs is None  # its size only
+    assert force.apply_to(PROCESS_NOISE, rows).runs is None
 
 
 # --- what is nominal of it
@@ -297,9 +297,9 @@ def asked(monkeypatch):
     """Residuals of the nominal campaign when the force is tested, and the weights."""
     output = {}
 
-    real = raised_noise.left_by
+    real = raised_noise.residual
 
-    def left_by(linear, d, nominal, weight, counts):
+    def residual(linear, d, nominal, weight, counts):
         left = likelihood.weighed(linear, nominal).dd[:, 0, 0]
         output.update(left=left, weight=weight)
         assert not d.any()
@@ -308,7 +308,7 @@ def asked(monkeypatch):
     def estimate_side_force(left, reference):
         return SideForce(0.0, output.get("gain", 7.0), 0.3, 2.0, UNIT)
 
-    monkeypatch.setattr(raised_noise, "left_by", left_by)
+    monkeypatch.setattr(raised_noise, "residual", residual)
     monkeypatch.setattr(unrecorded_thruster, "estimate_side_force", estimate_side_force)
     return output
 
@@ -330,7 +330,7 @@ def test_what_is_nominal_of_a_cause_is_no_intermittent_force(asked):
     columns = straight.columns_of(CAUSES)
     record = straight.sailed(12)
     numbers = np.zeros(columns.linearised)
-    numbers[columns.of["drag"]] = 5.0
+    numbers[columns.indices["drag"]] = 5.0
     left = {}
     for own in (numbers, 0.0 * numbers):
         given = straight.passed(record, columns, own, sensitivity=3.0)

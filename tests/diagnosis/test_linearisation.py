@@ -76,7 +76,7 @@ def gap(model, theta, at: Path, numbers) -> np.ndarray:
     cut = segments.cut(record, ROWS)
     states = np.asarray(
         linearisation.states_along(
-            model, theta, at.start, at.at_instants(GRID), cut.driven, cut.step
+            model, theta, at.start, at.interpolate(GRID), cut.driven, cut.step
         )
     )
     pairs = 0.5 * (states[:, 1:] + states[:, :-1])

@@ -60,7 +60,7 @@ def test_a_path_is_pulled_onto_a_known_acceleration():
     )
     true = Path(RECORD.state[ROWS], np.tile(acceleration, (4, 1, 1)))
     cut = simulated(true)
-    found = linearisation.pulled(Toy(), THETA, cut, GRID, replace(WIDE, noise=0.01 * WIDE.noise))
+    found = linearisation.fit_path(Toy(), THETA, cut, GRID, replace(WIDE, noise=0.01 * WIDE.noise))
     y, _ = linearisation.simulated(Toy(), THETA, cut, found, GRID)
     assert y == pytest.approx(cut.y, abs=1e-4)
     assert found.start == pytest.approx(true.start, abs=2e-3)
@@ -76,7 +76,7 @@ def test_a_path_is_pulled_until_it_converges():
     free = replace(WIDE, start=1e3 * WIDE.start)
     off = {}
     for rounds in (2, linearisation.MOST_PULLS):
-        found = linearisation.pulled(
+        found = linearisation.fit_path(
             Toy(), THETA, cut, GRID, free, replace(true, start=start), rounds
         )
         y, _ = linearisation.simulated(Toy(), THETA, cut, found, GRID)
@@ -95,18 +95,18 @@ def test_a_path_held_firmly_follows_the_acceleration_that_is_expected_of_it():
     cut = simulated(true)
     about = true.acceleration.reshape(4, -1)
     firm = replace(WIDE, acceleration=1e-6 * WIDE.acceleration)
-    found = linearisation.pulled(Toy(), THETA, cut, GRID, firm, rounds=3, about=about)
+    found = linearisation.fit_path(Toy(), THETA, cut, GRID, firm, rounds=3, about=about)
     assert found.acceleration == pytest.approx(true.acceleration, abs=1e-5)
     assert linearisation.simulated(Toy(), THETA, cut, found, GRID)[0] == pytest.approx(
         cut.y, abs=1e-3
     )
-    without = linearisation.pulled(Toy(), THETA, cut, GRID, firm, rounds=3)
+    without = linearisation.fit_path(Toy(), THETA, cut, GRID, firm, rounds=3)
     assert without.acceleration == pytest.approx(0.0, abs=1e-5)
     off = linearisation.simulated(Toy(), THETA, cut, without, GRID)[0] - cut.y
     assert np.abs(off).max() > 0.02
     none = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
     linear = linearisation.linear(Toy(), THETA, cut, GRID, without, *none)
-    ahead = linearisation.ahead(linear, np.zeros(4), firm, about)
+    ahead = linearisation.predict_path(linear, np.zeros(4), firm, about)
     assert ahead.acceleration == pytest.approx(true.acceleration, abs=1e-5)
 
 
@@ -118,7 +118,7 @@ def test_a_path_that_is_not_finite_is_lost_by_itself():
     broken = replace(true, acceleration=true.acceleration.copy())
     broken.acceleration[1, 0, 3] = np.nan
     away = np.arange(4) == 1
-    pulled = linearisation.pulled(Toy(), THETA, cut, GRID, WIDE, broken)
+    pulled = linearisation.fit_path(Toy(), THETA, cut, GRID, WIDE, broken)
     assert np.array_equal(pulled.acceleration[1], broken.acceleration[1], equal_nan=True)
     assert pulled.start[~away] == pytest.approx(true.start[~away], abs=1e-6)
     none = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
@@ -142,7 +142,7 @@ def test_a_path_is_pulled_on_a_longer_grid_too():
     y, _ = linearisation.simulated(Toy(), THETA, cut, true, g)
     cut = replace(cut, y=y)
     tight = replace(WIDE, noise=0.01 * WIDE.noise)
-    found = linearisation.pulled(Toy(), THETA, cut, g, tight, rounds=3)
+    found = linearisation.fit_path(Toy(), THETA, cut, g, tight, rounds=3)
     assert found.acceleration[..., 1:-1] == pytest.approx(true.acceleration[..., 1:-1], abs=2e-3)
     assert not linearisation.linear(Toy(), THETA, cut, g, found, moved, observed, WIDE).lost.any()
 
@@ -154,7 +154,7 @@ def test_what_was_not_used_does_not_pull():
     used[:, 6:8] = False
     wrong = np.where(used, cut.y, 1e3)
     bad = replace(cut, y=wrong, used=used)
-    found = linearisation.pulled(Toy(), THETA, bad, GRID, WIDE, true)
+    found = linearisation.fit_path(Toy(), THETA, bad, GRID, WIDE, true)
     y, _ = linearisation.simulated(Toy(), THETA, bad, found, GRID)
     assert y == pytest.approx(cut.y, abs=1e-6)
 
@@ -166,17 +166,17 @@ def test_a_linearisation_expects_where_its_path_will_be_pulled():
     true = replace(path(), acceleration=np.zeros((4, 3, GRID.nodes)))
     cut = simulated(true)
     wrong, tight = THETA * np.array([1.0, 1.1, 1.0, 1.0]), replace(WIDE, noise=0.01 * WIDE.noise)
-    stood = linearisation.pulled(Toy(), wrong, cut, GRID, tight)
+    stood = linearisation.fit_path(Toy(), wrong, cut, GRID, tight)
     size = np.abs(stood.acceleration[:, 2]).max()
     assert size > 1e-4
     nothing = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
     linear = linearisation.linear(Toy(), wrong, cut, GRID, stood, *nothing)
-    found = linearisation.ahead(linear, THETA - wrong, tight)
+    found = linearisation.predict_path(linear, THETA - wrong, tight)
     assert np.abs(found.acceleration[:, 2]).max() < 0.1 * size
     assert found.start == pytest.approx(true.start, abs=1e-3)
-    stays = linearisation.ahead(linear, np.zeros(4), tight)
+    stays = linearisation.predict_path(linear, np.zeros(4), tight)
     assert stays.acceleration == pytest.approx(stood.acceleration, abs=0.1 * size)
-    firm = linearisation.ahead(
+    firm = linearisation.predict_path(
         linear, np.zeros(4), replace(tight, acceleration=1e-6 * WIDE.acceleration)
     )
     assert (

@@ -16,7 +16,7 @@ from shiplog.diagnosis.trial import setup
 from shiplog.diagnosis.trial import trial_voyages as trials
 from shiplog.diagnosis.trial.fitted import Fit
 from shiplog.diagnosis.trial.setup import trial_of
-from shiplog.diagnosis.trial.trial_voyages import in_ship_time, record_of
+from shiplog.diagnosis.trial.trial_voyages import record_of, rescale_time
 from shiplog.diagnosis.verdict import network_base
 from shiplog.diagnosis.verdict.held_out import HeldOut
 from shiplog.report.diagnosis.verdict_sentence import less
@@ -48,7 +48,7 @@ def afloat(tmp_path_factory):
         split=Split(training=tuple(names[1:]), validation=tuple(names[:1])),
     )  # fmt: skip
     run = train_run(config, store, work / "run")
-    _, recorded = in_ship_time(run, None, record_of(store, names, run.profile))
+    _, recorded = rescale_time(run, None, record_of(store, names, run.profile))
     made = []
 
     def kept(*given, **named):
@@ -116,7 +116,7 @@ def test_what_is_named_stands_in_the_network_with_the_judges_numbers(afloat):
     assert extended.named == afloat.decision.named
     (one,) = extended.named
     assert extended.fit.point.numbers["current"] == pytest.approx(one.numbers)
-    assert extended.fit.found.numbers["current"] == pytest.approx(one.numbers, rel=1e-4)
+    assert extended.fit.estimate.numbers["current"] == pytest.approx(one.numbers, rel=1e-4)
     assert extended.nothing.point.numbers == {} and extended.nothing.included == ()
     ref, base = trial.reference, trial.reference.model.base
     d = fits.solution(trial, extended.fit).mean
@@ -125,7 +125,7 @@ def test_what_is_named_stands_in_the_network_with_the_judges_numbers(afloat):
     assert np.abs(weights).max() > 0.0 and base.bent is None
     assert (trial.rows == afloat.trial.rows).all()
     assert afloat.network.extended_by(afloat.decision)[0] is trial
-    less = afloat.trial.leaving_out(np.arange(len(trial.rows)) == 3)
+    less = afloat.trial.leave_out(np.arange(len(trial.rows)) == 3)
     again, _ = network_base.Own(afloat.run, less).extended_by(afloat.decision)
     assert (again.weight == 0.0).nonzero()[0].tolist() == [3]
 
@@ -134,7 +134,7 @@ def test_each_voyage_is_left_out_of_the_bends_and_of_the_numbers(afloat):
     decision = replace(afloat.decision, adapted=True)
     names = afloat.names
     (numbers, bends), (others, bent) = (
-        afloat.held.without(decision, name, None) for name in names[:2]
+        afloat.held.refit(decision, name, None) for name in names[:2]
     )
     whole = afloat.held.extended(decision).model.base.bent
     assert bends.shape == bent.shape == whole.shape

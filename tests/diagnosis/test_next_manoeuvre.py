@@ -23,7 +23,7 @@ def test_what_a_rival_imitates_does_not_count(counts):
     g[1:, 1:] = x.T @ x
     known = np.diag([4.0, 1e9, 1e9])  # the causes' nominal sizes are as good as known
     columns = SimpleNamespace(
-        of={"one": np.array([1]), "other": np.array([2])}, unit=np.array([1.0, 2.0, 1.0])
+        indices={"one": np.array([1]), "other": np.array([2])}, unit=np.array([1.0, 2.0, 1.0])
     )
     trial = SimpleNamespace(
         reference=SimpleNamespace(columns=columns, information=known, counts=counts)

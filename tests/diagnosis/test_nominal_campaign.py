@@ -117,13 +117,15 @@ def learned(model):
     columns = nominal_fit.columns_of(model, SETTING, START)
     record = straight.sailed(24)
     numbers = np.zeros(len(columns.unit))
-    numbers[columns.of["drag"]] = 0.5
+    numbers[columns.indices["drag"]] = 0.5
     given = straight.passed(record, columns, numbers, sensitivity=0.3)
     at = Converged(np.zeros(2), given.path, PROCESS_NOISE)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(campaign_characteristics, "read", lambda *_: (given.cut, None, None))
         patch.setattr(campaign_characteristics.linearisation, "linear", lambda *_: given)
-        patch.setattr(campaign_characteristics.linearisation, "pulled", lambda *_, **__: given.path)
+        patch.setattr(
+            campaign_characteristics.linearisation, "fit_path", lambda *_, **__: given.path
+        )
         found = campaign_characteristics.characteristics(model, SETTING, START, record, at)
         made = nominal_campaign.learn(model, SETTING, START, record, at, found)
     return found, made
@@ -132,7 +134,7 @@ def learned(model):
 def test_a_campaign_knows_what_is_nominal_of_a_cause(learned):
     """The cause that all voyages have is expected in a trial, to within its spread."""
     _, made = learned
-    at = made.reference.columns.of["drag"][0]
+    at = made.reference.columns.indices["drag"][0]
     spread = np.sqrt(np.linalg.inv(made.reference.information)[at, at])
     assert 0.01 < spread < 0.5
     assert made.reference.mean[at] == pytest.approx(1.0, abs=4.0 * spread)  # in units of 0.5
@@ -168,12 +170,14 @@ def test_characteristics_say_every_group_once(learned):
         "hull coefficients", "rudder coefficients", "two", "drag",
         "motion discrepancy", "controls discrepancy", "wind discrepancy",
     }  # fmt: skip
-    assert set(found.size) == set(discrepancy.SEEN)
+    assert set(found.size) == set(discrepancy.MODELLED)
     assert all(0.0 < value < 1.0 for value in found.deviation.values())
     # what a trial is given is by these names, column by column
     columns = made.reference.columns
     for label in ("two", "drag"):
-        assert made.effects.deviation[columns.of[label]] == pytest.approx(found.deviation[label])
+        assert made.effects.deviation[columns.indices[label]] == pytest.approx(
+            found.deviation[label]
+        )
     for family in made.discrepancy.families:
         assert made.effects.size[family.columns] == pytest.approx(found.size[family.name])
     assert made.reference.counts == found.share
@@ -200,7 +204,9 @@ def test_a_path_follows_the_discrepancy_with_all_other_numbers_where_they_are(le
     ref, cut = made.reference, made.reference.nominal.cut
     assert ref.expected.shape == (made.discrepancy.count,)
     g = segments.grid(straight.sailed(24))
-    assert ref.about(cut, g) == pytest.approx(made.discrepancy.accelerations(cut, g) @ ref.expected)
+    assert ref.expected_acceleration(cut, g) == pytest.approx(
+        made.discrepancy.accelerations(cut, g) @ ref.expected
+    )
 
 
 def test_columns_follow_one_another(learned):
@@ -208,11 +214,11 @@ def test_columns_follow_one_another(learned):
     _, made = learned
     columns = made.reference.columns
     at = columns.linearised
-    for family in (*made.discrepancy.families, *made.unseen.families):
+    for family in (*made.discrepancy.families, *made.omitted.families):
         assert family.columns.tolist() == list(range(at, at + len(family.columns)))
         at += len(family.columns)
     assert len(columns.unit) == columns.linearised + made.discrepancy.count
-    assert all(len(one) == 1 + len(columns.unit) + made.unseen.count for one in made.each)
+    assert all(len(one) == 1 + len(columns.unit) + made.omitted.count for one in made.each)
     assert len(made.each) == len(made.parts) == len(parts_of(made.reference.nominal.cut.voyage))
 
 
@@ -270,7 +276,7 @@ def test_a_name_that_the_campaign_did_not_know_may_differ_least(learned, model, 
     less = replace(found, deviation={n: v for n, v in found.deviation.items() if n != "drag"})
     at = Converged(np.zeros(2), given.path, PROCESS_NOISE)
     made = nominal_campaign.learn(model, SETTING, START, record, at, less)
-    own = made.effects.deviation[columns.of["drag"]]
+    own = made.effects.deviation[columns.indices["drag"]]
     assert own == pytest.approx([voyage_effects.UNSEEN_DEVIATION])
 
 
@@ -290,9 +296,9 @@ def test_coefficients_are_at_least_as_free_as_the_causes_that_scale_them(model):
         causes = (Scaled("scaled"),)
 
     start = replace(START, values=np.array([3.0, 0.8]))
-    assert nominal_campaign.widened(Model(), SETTING, start).spread == pytest.approx([1.5, 2.0])
+    assert nominal_campaign.widen(Model(), SETTING, start).spread == pytest.approx([1.5, 2.0])
     # of a cause that no fit absorbs nothing follows
-    assert nominal_campaign.widened(model, SETTING, start).spread == pytest.approx([0.3, 2.0])
+    assert nominal_campaign.widen(model, SETTING, start).spread == pytest.approx([0.3, 2.0])
 
 
 def test_a_clock_that_two_channels_share_has_a_variance_of_its_own():

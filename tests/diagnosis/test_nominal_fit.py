@@ -9,7 +9,7 @@ import straight
 from straight import CAUSES, SETTING
 
 from shiplog.diagnosis.nominal import nominal_fit
-from shiplog.diagnosis.nominal.nominal_fit import most_probable_within
+from shiplog.diagnosis.nominal.nominal_fit import most_probable_in_room
 from shiplog.models.starting_values import Start
 
 BEGIN = 3.0  # of the coefficient; its true value is 0
@@ -23,7 +23,7 @@ def test_numbers_within_bounds_are_where_none_may_gain_any_more(seed):
     information = rows.T @ rows
     free = rng.standard_normal(7)
     room = np.stack((-rng.uniform(0.0, 0.6, 4), rng.uniform(0.0, 0.6, 4)))
-    found, gain = most_probable_within(free, np.linalg.inv(information), room)
+    found, gain = most_probable_in_room(free, np.linalg.inv(information), room)
     slope = information @ (free - found)
     low, high = (np.isclose(found[:4], end, atol=1e-8) for end in room)
     assert (found[:4] >= room[0] - 1e-8).all() and (found[:4] <= room[1] + 1e-8).all()
@@ -44,7 +44,7 @@ def test_without_a_bound_in_reach_they_are_the_free_ones():
     rng = np.random.default_rng(1)
     rows = rng.standard_normal((30, 5))
     free = rng.standard_normal(5)
-    found, gain = most_probable_within(
+    found, gain = most_probable_in_room(
         free, np.linalg.inv(rows.T @ rows), np.array([[-9.0] * 3, [9.0] * 3])
     )
     assert found == pytest.approx(free)
@@ -82,7 +82,8 @@ def fitted(
 
     monkeypatch.setattr(nominal_fit, "read", lambda *_: (plain.cut, None, None))
     for name, given in (
-        ("linear", linear), ("pulled", lambda *_: plain.path), ("ahead", lambda *_: plain.path)
+        ("linear", linear), ("fit_path", lambda *_: plain.path),
+        ("predict_path", lambda *_: plain.path),
     ):  # fmt: skip
         monkeypatch.setattr(nominal_fit.linearisation, name, given)
     return nominal_fit.converged(Model(), SETTING, start, record, rounds), np.array(asked)

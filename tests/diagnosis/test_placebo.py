@@ -20,7 +20,7 @@ def campaign(changed: float, part: int = 2, sensitivity: float = 0.6):
     record = straight.sailed(12)
     given = straight.passed(record, columns, sensitivity=sensitivity)
     numbers = np.zeros(columns.linearised)
-    numbers[columns.of["drag"]] = 0.5 * changed
+    numbers[columns.indices["drag"]] = 0.5 * changed
     inside = np.arange(3 * part, 3 * part + 3)
     given.e[inside] += given.j[inside] @ numbers
     return straight.campaign(record, given, columns, share=SHARE, deviation=0.02, size=0.1)
@@ -56,8 +56,8 @@ def test_a_placebo_is_the_difference_of_two_evidences(name, sizes):
     made = campaign(1.5)
     columns = made.reference.columns
     count = len(made.reference.pull)
-    families = {f.name: f.columns for f in (*made.discrepancy.families, *made.unseen.families)}
-    at = columns.of.get(name, families.get(name))
+    families = {f.name: f.columns for f in (*made.discrepancy.families, *made.omitted.families)}
+    at = columns.indices.get(name, families.get(name))
     best = 0.0
     for left_out, gram in enumerate(made.voyages):
         information, pull = made.prior_without(left_out)
@@ -84,7 +84,7 @@ def test_what_parts_differ_by_is_no_placebo():
     columns = straight.columns_of(CAUSES)
     record = straight.sailed(12)
     given = straight.passed(record, columns, sensitivity=0.6)
-    at = columns.of["drag"]
+    at = columns.indices["drag"]
     for part, value in enumerate((-1.0, 1.0, -0.6, 0.6)):
         inside = np.arange(3 * part, 3 * part + 3)
         given.e[inside] += given.j[inside][..., at] @ np.array([0.5 * value])

@@ -201,7 +201,9 @@ def test_noise_that_no_ordinary_day_has_is_raised_under_whatever_prior(trial, no
     campaign = replace(trial.campaign, noise=spread)
     made = weighed.search(replace(trial, campaign=campaign), {(DRAG, NOMINAL): 1.0})
     one = made.table.found[DRAG, NOMINAL]
-    made.table.found[DRAG, NOMINAL] = replace(one, found=replace(one.found, noise_factor=noise))
+    made.table.found[DRAG, NOMINAL] = replace(
+        one, estimate=replace(one.estimate, noise_factor=noise)
+    )
     assert posterior(made).kinds[kind] == pytest.approx(1.0)
     made = weighed.search(replace(trial, campaign=campaign), {(DRAG, RAISED): 1.0}, raised=noise)
     assert posterior(made).kinds[kind] == pytest.approx(1.0)

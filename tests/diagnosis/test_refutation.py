@@ -9,7 +9,7 @@ import weighed
 
 from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED
-from shiplog.diagnosis.verdict.refutation import judged
+from shiplog.diagnosis.verdict.refutation import judge
 from shiplog.simulation.error_reduction import Gain
 
 DRAG, LOAD, TWO = ("drag",), ("load",), ("two",)
@@ -51,7 +51,7 @@ def trial():
 
 def test_without_held_out_voyages_the_decision_stands(trial):
     made = weighed.search(trial, {(DRAG, NOMINAL): 1.0})
-    decision, found, gained, refuted = judged(made, None)
+    decision, found, gained, refuted = judge(made, None)
     assert [one.cause.label for one in decision.named] == ["drag"]
     assert (gained, refuted) == (None, {})
     assert found.names["drag"] == pytest.approx(1.0)
@@ -59,14 +59,14 @@ def test_without_held_out_voyages_the_decision_stands(trial):
 
 def test_nothing_named_is_not_held_out(trial):
     held = HeldOut({})
-    decision, _, gained, refuted = judged(weighed.search(trial, {((), NOMINAL): 1.0}), held)
+    decision, _, gained, refuted = judge(weighed.search(trial, {((), NOMINAL): 1.0}), held)
     assert (decision.verdict, gained, refuted, held.asked) == ("none", None, {}, [])
 
 
 @pytest.mark.parametrize("interval", (BETTER, UNSURE, HARDLY))
 def test_what_is_not_significantly_worse_stays(trial, interval):
     held = HeldOut({DRAG: interval})
-    decision, _, gained, refuted = judged(weighed.search(trial, {(DRAG, NOMINAL): 1.0}), held)
+    decision, _, gained, refuted = judge(weighed.search(trial, {(DRAG, NOMINAL): 1.0}), held)
     assert [one.cause.label for one in decision.named] == ["drag"]
     assert (gained.low, gained.high) == interval
     assert refuted == {}
@@ -76,7 +76,7 @@ def test_what_is_not_significantly_worse_stays(trial, interval):
 def test_with_a_remainder_an_unsure_gain_names_nothing(trial, interval):
     """The verdict is the remainder's; the cause keeps its probability, with the reason."""
     made = weighed.search(trial, {(DRAG, RAISED): 1.0} | RAISED_ALONE)
-    decision, found, gained, refuted = judged(made, HeldOut({DRAG: interval}))
+    decision, found, gained, refuted = judge(made, HeldOut({DRAG: interval}))
     assert (decision.verdict, decision.named, gained, refuted) == ("unknown", (), None, {})
     assert decision.structure.family == "stochastic"
     assert found.names["drag"] == pytest.approx(1.0)
@@ -86,10 +86,10 @@ def test_with_a_remainder_an_unsure_gain_names_nothing(trial, interval):
 def test_a_remainder_of_which_the_kind_is_unsure_asks_for_the_same_proof(trial):
     """Motion or raised noise, neither of them sure: that something remains is."""
     made = weighed.search(trial, {(DRAG, RAISED): 0.5, (DRAG, "motion"): 0.5} | RAISED_ALONE)
-    decision, found, _, _ = judged(made, HeldOut({DRAG: UNSURE}))
+    decision, found, _, _ = judge(made, HeldOut({DRAG: UNSURE}))
     assert found.remainder is None and found.kinds[NOMINAL] < 0.01
     assert decision.named == () and "drag" in decision.rejected
-    named, _, _, _ = judged(made, HeldOut({DRAG: BETTER}))
+    named, _, _, _ = judge(made, HeldOut({DRAG: BETTER}))
     assert [one.cause.label for one in named.named] == ["drag"]
 
 
@@ -100,14 +100,14 @@ def test_a_remainder_that_adds_little_is_an_error_of_the_equations(trial, adds, 
         trial, {(DRAG, NOMINAL): 0.01, (DRAG, RAISED): 0.99},
         evidence={(DRAG, NOMINAL): 100.0, (DRAG, RAISED): 100.0 + adds},
     )  # fmt: skip
-    decision, found, _, _ = judged(made, HeldOut({DRAG: UNSURE}))
+    decision, found, _, _ = judge(made, HeldOut({DRAG: UNSURE}))
     assert found.remainder == RAISED
     assert decision.verdict == verdict
 
 
 def test_with_a_remainder_a_sure_gain_names_the_cause(trial):
     held = HeldOut({DRAG: BETTER})
-    decision, _, gained, _ = judged(
+    decision, _, gained, _ = judge(
         weighed.search(trial, {(DRAG, RAISED): 1.0} | RAISED_ALONE), held
     )
     assert (decision.verdict, gained.low) == ("named", BETTER[0])
@@ -120,7 +120,7 @@ def test_what_is_significantly_worse_is_dropped_and_the_next_is_judged(trial):
         trial, {(DRAG, NOMINAL): 0.96, (LOAD, NOMINAL): 0.039, ((), NOMINAL): 1e-4}
     )
     held = HeldOut({DRAG: WORSE, LOAD: BETTER})
-    decision, found, gained, refuted = judged(made, held)
+    decision, found, gained, refuted = judge(made, held)
     assert held.asked == [DRAG, LOAD]
     assert [one.cause.label for one in decision.named] == ["load"]
     assert found.names == pytest.approx({"load": 0.039 / 0.0391})
@@ -135,7 +135,7 @@ def test_what_takes_the_place_of_a_refuted_name_must_prove_itself(trial):
     made = weighed.search(
         trial, {(DRAG, NOMINAL): 0.96, (LOAD, NOMINAL): 0.039, ((), NOMINAL): 1e-4}
     )
-    decision, _, gained, refuted = judged(made, HeldOut({DRAG: WORSE, LOAD: UNSURE}))
+    decision, _, gained, refuted = judge(made, HeldOut({DRAG: WORSE, LOAD: UNSURE}))
     assert (decision.verdict, decision.named, gained) == ("undecided", (), None)
     assert decision.rejected["drag"].startswith("held-out voyages refute it")
     assert decision.rejected["load"].startswith("held-out voyages refute what is more probable")
@@ -155,7 +155,7 @@ def test_next_to_other_names_it_must_prove_itself_by_its_own_gain(trial, own, na
     held = HeldOut(
         {both: BETTER, other: BETTER, DRAG: BETTER}, {"drag": BETTER, "load": WORSE, "two": own}
     )
-    decision, _, gained, refuted = judged(made, held)
+    decision, _, gained, refuted = judge(made, held)
     assert [one.cause.label for one in decision.named] == named
     assert gained.low == BETTER[0]
     assert set(refuted) == {"load", "two"} - set(named)
@@ -175,7 +175,7 @@ def test_of_two_aliases_only_both_together_are_refuted(trial, monkeypatch, which
     held = HeldOut(
         {("drag", "load"): BETTER, DRAG: BETTER, LOAD: BETTER}, {"drag": WORSE, "load": UNSURE}
     )
-    decision, found, _, refuted = judged(made, held)
+    decision, found, _, refuted = judge(made, held)
     told = which == "two"  # it is not there
     assert [one.cause.label for one in decision.named] == (["load"] if told else ["drag"])
     assert list(refuted) == (["drag"] if told else ["load"])
@@ -194,7 +194,7 @@ def test_one_of_two_alike_may_be_refuted_after_both(trial, monkeypatch):
     held = HeldOut(
         {("drag", "load"): BETTER, DRAG: WORSE, LOAD: BETTER}, {"drag": WORSE, "load": UNSURE}
     )
-    decision, _, _, refuted = judged(made, held)
+    decision, _, _, refuted = judge(made, held)
     assert [one.cause.label for one in decision.named] == ["load"]
     assert list(refuted) == ["drag"]
 
@@ -206,7 +206,7 @@ def test_after_two_are_refuted_together_a_remainder_is_no_surer_than_they(trial,
         trial, {(("drag", "load"), NOMINAL): 0.97, ((), "time"): 0.02, (DRAG, NOMINAL): 1e-5}
     )
     held = HeldOut({("drag", "load"): BETTER}, {"drag": WORSE, "load": UNSURE})
-    decision, _, _, refuted = judged(made, held)
+    decision, _, _, refuted = judge(made, held)
     assert (decision.verdict, decision.named) == ("undecided", ())
     assert set(refuted) == {"drag", "load"} == set(decision.either)
     assert [decision.ranking[name] for name in ("drag", "load")] == [0.5, 0.5]
@@ -223,7 +223,7 @@ def test_what_gains_nothing_in_a_refuted_place_takes_no_other_name_with_it(trial
     held = HeldOut(
         {both: BETTER, other: joint, DRAG: UNSURE}, {"drag": UNSURE, "load": WORSE, "two": UNSURE}
     )
-    decision, _, _, refuted = judged(made, held)
+    decision, _, _, refuted = judge(made, held)
     assert [one.cause.label for one in decision.named] == ["drag"]
     assert set(refuted) == {"load", "two"}
 
@@ -234,7 +234,7 @@ def test_of_several_in_a_refuted_place_each_must_gain(trial):
         trial, {(DRAG, NOMINAL): 0.96, (pair, NOMINAL): 0.039, (LOAD, NOMINAL): 1e-3}
     )
     held = HeldOut({DRAG: WORSE, pair: BETTER, LOAD: BETTER}, {"load": BETTER, "two": UNSURE})
-    decision, _, _, refuted = judged(made, held)
+    decision, _, _, refuted = judge(made, held)
     assert [one.cause.label for one in decision.named] == ["load"]
     assert set(refuted) == {"drag", "two"}
 
@@ -242,7 +242,7 @@ def test_of_several_in_a_refuted_place_each_must_gain(trial):
 def test_what_was_named_together_with_a_refuted_name_need_not(trial):
     made = weighed.search(trial, {(("drag", "load"), NOMINAL): 0.97, (LOAD, NOMINAL): 0.03})
     held = HeldOut({("drag", "load"): BETTER, LOAD: UNSURE}, {"drag": (-0.5, -0.2), "load": UNSURE})
-    decision, _, _, refuted = judged(made, held)
+    decision, _, _, refuted = judge(made, held)
     assert [one.cause.label for one in decision.named] == ["load"]
     assert list(refuted) == ["drag"]
 
@@ -251,7 +251,7 @@ def test_after_a_refutation_the_rest_may_be_undecided(trial):
     made = weighed.search(
         trial, {(DRAG, NOMINAL): 0.96, (LOAD, NOMINAL): 0.02, (TWO, NOMINAL): 0.02}
     )
-    decision, _, gained, refuted = judged(made, HeldOut({DRAG: WORSE}))
+    decision, _, gained, refuted = judge(made, HeldOut({DRAG: WORSE}))
     assert (decision.verdict, decision.named, gained) == ("undecided", (), None)
     assert list(refuted) == ["drag"]
 
@@ -262,7 +262,7 @@ def test_everything_refuted_ends_with_nothing(trial):
     clocks = {(("clock:wind",), NOMINAL): 1e-8, (("clock:gnss",), NOMINAL): 1e-9}
     made = weighed.search(trial, given | clocks)
     held = HeldOut({(label,): WORSE for label in ("drag", "load", "two", "clock:wind")})
-    decision, found, gained, refuted = judged(made, held)
+    decision, found, gained, refuted = judge(made, held)
     assert held.asked == [DRAG, LOAD, TWO, ("clock:wind",)]
     assert (decision.verdict, decision.named, gained) == ("none", (), None)
     assert set(refuted) == {"drag", "load", "two", "clock"}
@@ -275,7 +275,7 @@ def test_of_two_the_one_that_is_worth_least_goes_first(trial):
     held = HeldOut(
         {("drag", "load"): BETTER, LOAD: BETTER}, {"drag": (-0.5, -0.2), "load": (-0.3, -0.1)}
     )
-    decision, _, gained, refuted = judged(made, held)
+    decision, _, gained, refuted = judge(made, held)
     assert held.asked == [("drag", "load"), LOAD]
     assert [one.cause.label for one in decision.named] == ["load"]
     assert list(refuted) == ["drag"]
@@ -286,7 +286,7 @@ def test_of_two_each_is_judged_over_the_other_alone(trial):
     """Together they are better than nothing; one is significantly worse than not having it."""
     made = weighed.search(trial, {(("drag", "load"), NOMINAL): 0.97, (DRAG, NOMINAL): 0.03})
     held = HeldOut({("drag", "load"): BETTER, DRAG: BETTER}, {"drag": UNSURE, "load": WORSE})
-    decision, _, _, refuted = judged(made, held)
+    decision, _, _, refuted = judge(made, held)
     assert [one.cause.label for one in decision.named] == ["drag"]
     assert list(refuted) == ["load"]
 
@@ -297,7 +297,7 @@ def test_what_the_windows_do_not_feel_they_do_not_refute(trial):
     gains, worths = {("drag", "load"): BETTER, LOAD: BETTER}, {"drag": WORSE, "load": UNSURE}
     for hidden, named in (((), ["load"]), (("drag",), ["drag", "load"])):
         held = HeldOut(gains, worths, hidden)
-        decision, _, _, refuted = judged(weighed.search(trial, given), held)
+        decision, _, _, refuted = judge(weighed.search(trial, given), held)
         assert sorted(one.cause.label for one in decision.named) == named
         assert list(refuted) == [name for name in ("drag",) if name not in named]
 
@@ -311,7 +311,7 @@ def test_next_to_an_unrecorded_thruster_windows_refute_faults_of_sensors_only(
     both = {(DRAG, INTERMITTENT): 1.0, ((), INTERMITTENT): 1e-6}
     made = weighed.search(trial, both, side_force=force)
     monkeypatch.setattr(straight.One, "kind", kind)
-    decision, _, _, found = judged(made, HeldOut({DRAG: WORSE}))
+    decision, _, _, found = judge(made, HeldOut({DRAG: WORSE}))
     assert [one.cause.label for one in decision.named] == ([] if refuted else ["drag"])
     assert decision.side_force is force
     assert set(found) == ({"drag"} if refuted else set())
@@ -319,7 +319,7 @@ def test_next_to_an_unrecorded_thruster_windows_refute_faults_of_sensors_only(
 
 def test_a_gain_without_bounds_refutes_nothing(trial):
     held = HeldOut({DRAG: (-math.inf, math.nan)})
-    decision, _, _, refuted = judged(weighed.search(trial, {(DRAG, NOMINAL): 1.0}), held)
+    decision, _, _, refuted = judge(weighed.search(trial, {(DRAG, NOMINAL): 1.0}), held)
     assert (len(decision.named), refuted) == (1, {})
 
 
@@ -327,6 +327,6 @@ def test_a_gain_without_bounds_refutes_nothing(trial):
 def test_what_takes_most_off_the_error_comes_first(trial, first):
     made = weighed.search(trial, {(("drag", "load"), NOMINAL): 1.0})
     worths = {"drag": UNSURE, "load": UNSURE} | {first: BETTER}
-    decision, _, _, _ = judged(made, HeldOut({("drag", "load"): BETTER}, worths))
+    decision, _, _, _ = judge(made, HeldOut({("drag", "load"): BETTER}, worths))
     assert decision.named[0].cause.label == first
     assert {one.cause.label for one in decision.named} == {"drag", "load"}

@@ -11,7 +11,7 @@ import pytest
 from shiplog.diagnosis.hypotheses import evaluate, evidence
 from shiplog.diagnosis.hypotheses.evaluate import RELINEARISATIONS
 from shiplog.diagnosis.noise.remainder import Remainder
-from shiplog.diagnosis.trial.fitted import Found, Start
+from shiplog.diagnosis.trial.fitted import Estimate, Start
 
 NOISE = 0.1
 
@@ -20,7 +20,7 @@ def fits(monkeypatch, function, slope) -> tuple[Any, list[float]]:
     """A trial that sees function(x) with NOISE where it is 0; the points x that were asked for."""
     asked: list[float] = []
 
-    def at(numbers, *_):
+    def linearise(numbers, *_):
         asked.append(float(numbers["x"][0]))
         linear = SimpleNamespace(e=np.zeros(1))
         return SimpleNamespace(numbers=numbers, path=None, linear=linear)
@@ -31,17 +31,17 @@ def fits(monkeypatch, function, slope) -> tuple[Any, list[float]]:
         step = off / by
         density = -0.5 * off**2
         value = density + 0.5 * (step * by) ** 2 - np.log(by)
-        return Found("", value, 1.0, {"x": np.array([x + step])}, np.eye(1) / by**2,
+        return Estimate("", value, 1.0, {"x": np.array([x + step])}, np.eye(1) / by**2,
                      density=density)  # fmt: skip
 
     monkeypatch.setattr(evidence, "fit", fit)
     monkeypatch.setattr(evidence, "scan", lambda *given, **_: (fit(*given), []))
-    return SimpleNamespace(at=at, first=None, fixed=(), clipped=dict), asked
+    return SimpleNamespace(linearise=linearise, first=None, fixed=(), clipped=dict), asked
 
 
 def converge(trial, included, numbers, path, lowest=-np.inf):
     fit = evaluate.evaluate(trial, included, Remainder(), Start(numbers, path), lowest)
-    return fit.point, fit.found
+    return fit.point, fit.estimate
 
 
 def test_what_is_linear_takes_one_step(monkeypatch):
@@ -77,16 +77,16 @@ def test_numbers_of_a_fit_without_end_are_in_the_order_of_their_covariance(monke
     order: a tenth of the spread of b is not that of a."""
     trial, _ = fits(monkeypatch, np.cbrt, lambda x: np.abs(x) ** (-2.0 / 3.0) / 3.0)
 
-    def at(numbers, *_):
+    def linearise(numbers, *_):
         if numbers["b"][0] != 1.0:
             raise np.linalg.LinAlgError
         return SimpleNamespace(numbers=numbers, path=None, linear=SimpleNamespace(e=np.zeros(1)))
 
     def fit(*_):
         numbers = {"a": np.array([9.0]), "b": np.array([9.0])}
-        return Found("", 0.0, 1.0, numbers, np.diag([1.0, 0.01]), density=0.0)
+        return Estimate("", 0.0, 1.0, numbers, np.diag([1.0, 0.01]), density=0.0)
 
-    trial.at = at
+    trial.linearise = linearise
     monkeypatch.setattr(evidence, "scan", lambda *given, **_: (fit(*given), []))
     _, found = converge(trial, ("a", "b"), {"b": np.array([1.0]), "a": np.array([2.0])}, None)
     spread = dict(zip(found.numbers, np.sqrt(np.diag(found.covariance)), strict=True))
@@ -108,9 +108,9 @@ def test_numbers_that_the_model_has_already_are_never_halved(monkeypatch):
     damped: by a quarter, which two halvings left, then by a half."""
     trial, asked = fits(monkeypatch, lambda x: x, lambda x: 1.0)
     trial.fixed = ("held",)
-    seen, plain = [], trial.at
+    seen, plain = [], trial.linearise
 
-    def at(numbers, *more):
+    def linearise(numbers, *more):
         seen.append(float(numbers["held"][0]))
         if numbers.get("x", np.full(1, 9.0))[0] > 1.0:
             raise np.linalg.LinAlgError
@@ -118,9 +118,9 @@ def test_numbers_that_the_model_has_already_are_never_halved(monkeypatch):
 
     def fit(_trial, point, *_):
         numbers = {"held": point.numbers["held"], "x": np.zeros(1)}
-        return Found("", 0.0, 1.0, numbers, np.eye(2), density=0.0)
+        return Estimate("", 0.0, 1.0, numbers, np.eye(2), density=0.0)
 
-    trial.at = at
+    trial.linearise = linearise
     monkeypatch.setattr(evidence, "scan", lambda *given, **_: (fit(*given), []))
     monkeypatch.setattr(evidence, "fit", fit)
     held = {"held": np.array([3.0])}
@@ -140,17 +140,17 @@ def test_a_path_that_nominal_noise_holds_too_firmly_refutes_no_numbers(
     next one is as that noise allows, and nothing is halved. Where the noise is nominal, the numbers
     are too far off, and are halved until there are no halvings left."""
     trial, asked = fits(monkeypatch, lambda x: x, lambda x: 1.0)
-    plain, held = trial.at, []
+    plain, held = trial.linearise, []
 
-    def at(numbers, near, noise_factor, remainder):
+    def linearise(numbers, near, noise_factor, remainder):
         held.append(noise_factor)
         return plain(numbers)
 
     def scan(_trial, point, *_, **__):
         density = 0.0 if held[-1] == 4.0 else -100.0
-        return Found("", density, noise, point.numbers, np.eye(1), density=density), []
+        return Estimate("", density, noise, point.numbers, np.eye(1), density=density), []
 
-    trial.at, trial.first = at, SimpleNamespace()
+    trial.linearise, trial.first = linearise, SimpleNamespace()
     monkeypatch.setattr(evidence, "scan", scan)
     monkeypatch.setattr(evidence, "fit", lambda *given: scan(*given)[0])
     _, found = converge(trial, ("x",), {"x": np.array([1.0])}, None, lowest=-50.0)

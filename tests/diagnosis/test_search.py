@@ -27,8 +27,8 @@ def one():
 def test_a_hidden_cause_is_found_and_sized(one):
     best = one.table.ranked()[0]
     assert (best.causes, best.kind) == (("drag",), NOMINAL)
-    spread = float(np.sqrt(best.found.covariance[0, 0]))
-    assert best.found.numbers["drag"][0] == pytest.approx(1.2, abs=4.0 * spread)
+    spread = float(np.sqrt(best.estimate.covariance[0, 0]))
+    assert best.estimate.numbers["drag"][0] == pytest.approx(1.2, abs=4.0 * spread)
     assert spread < 0.2
     assert (
         one.table.alone["drag"] > 20.0 > max(v for k, v in one.table.alone.items() if k != "drag")
@@ -47,7 +47,7 @@ def test_a_cause_whose_fit_diverges_is_no_answer(monkeypatch):
 
     def diverges(trial, included, *more, **others):
         fit = before(trial, included, *more, **others)
-        gone = replace(fit, found=replace(fit.found, evidence=-math.inf))
+        gone = replace(fit, estimate=replace(fit.estimate, evidence=-math.inf))
         return gone if "drag" in included else fit
 
     monkeypatch.setattr(weighing, "resume", diverges)
@@ -99,7 +99,7 @@ def test_two_hidden_causes_are_both_found(hidden):
     best = found.table.ranked()[0]
     assert best.causes == tuple(sorted(hidden))
     for label in hidden:
-        assert np.sign(best.found.numbers[label]).tolist() == np.sign(sizes[label]).tolist()
+        assert np.sign(best.estimate.numbers[label]).tolist() == np.sign(sizes[label]).tolist()
     decision, _ = decide(found)
     assert {n.cause.label for n in decision.named} == set(hidden)
     # either by itself was weighed as well
@@ -181,10 +181,10 @@ def test_what_a_model_has_already_stays_with_what_is_found():
     assert best.causes == ("load",)
     assert not [labels for labels, _ in found.table.found if "drag" in labels]
     for hypothesis in found.table.found.values():
-        assert hypothesis.found.numbers["drag"] == pytest.approx([1.2], abs=1e-4)
+        assert hypothesis.estimate.numbers["drag"] == pytest.approx([1.2], abs=1e-4)
     decision, _ = decide(found)
     assert [n.cause.label for n in decision.named] == ["load"]
-    assert decision.named[0].numbers == pytest.approx(best.found.numbers["load"])
+    assert decision.named[0].numbers == pytest.approx(best.estimate.numbers["load"])
     spread = np.sqrt(decision.named[0].covariance[0, 0])
     assert decision.named[0].numbers[0] == pytest.approx(1.0, abs=4.0 * spread)
 
@@ -213,12 +213,12 @@ def test_a_set_with_one_cause_less_is_fitted_again_with_the_same_noise():
 def test_a_force_of_the_place_is_unknown_and_depends_on_position():
     """No cause has it: it is not named, and the kind of what remains is."""
     plain, point = trial_with({})
-    family = next(f for f in plain.unseen.families if f.name == "position")
+    family = next(f for f in plain.omitted.families if f.name == "position")
     rng = np.random.default_rng(5)
-    weights = np.zeros(plain.unseen.count)
-    first = plain.unseen.families[0].columns[0]
+    weights = np.zeros(plain.omitted.count)
+    first = plain.omitted.families[0].columns[0]
     weights[family.columns - first] = 9.0 * rng.standard_normal(len(family.columns))
-    accelerations = plain.unseen.accelerations(point.linear.cut, plain.grid) @ weights
+    accelerations = plain.omitted.accelerations(point.linear.cut, plain.grid) @ weights
     found = searched({}, accelerations=accelerations)
     decision, weighed = decide(found)
     assert decision.named == ()

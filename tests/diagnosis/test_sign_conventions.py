@@ -45,15 +45,15 @@ def simulator(true: np.ndarray, otherwise: float) -> SimpleNamespace:
      ((0.2, -0.1, -8.0), "the propeller's sign")],
 )  # fmt: skip
 def test_the_convention_that_the_log_has_is_found_whatever_the_others_do(true, words, otherwise):
-    found, loss = sign_conventions.best(simulator(np.array(true), otherwise), windows())
-    assert found.startswith(words)
-    assert loss == 5.0
+    found = sign_conventions.try_conventions(simulator(np.array(true), otherwise), windows())
+    assert found.words.startswith(words)
+    assert found.loss == 5.0
 
 
 def test_where_all_diverge_the_loss_is_that_of_a_divergence():
     """One of four windows: a quarter of RUNAWAY, and three quarters of 90."""
-    _, loss = sign_conventions.best(simulator(np.ones(3), np.nan), windows())
-    assert loss == pytest.approx(0.25 * RUNAWAY + 67.5)
+    found = sign_conventions.try_conventions(simulator(np.ones(3), np.nan), windows())
+    assert found.loss == pytest.approx(0.25 * RUNAWAY + 67.5)
 
 
 # --- conventions of heading, yaw rate, velocity, wind and units -----------------------------------

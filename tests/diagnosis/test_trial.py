@@ -26,7 +26,7 @@ HYPOTHESES = (
 def test_hypotheses_differ_as_dense_gaussians_do(trial, noise):
     """Log marginal likelihoods of 8 segments of 90 observations, nothing subtracted but that of
     nothing; every part has numbers of its own."""
-    point = trial.at({})
+    point = trial.linearise({})
     nothing, nominal = level(trial, point, noise), nats(trial, point, noise)
     differences = []
     for included, kind, size in HYPOTHESES[1:]:
@@ -43,7 +43,7 @@ def test_hypotheses_differ_as_dense_gaussians_do(trial, noise):
 def test_a_hypothesis_that_was_linearised_elsewhere_has_the_same_evidence(trial):
     """All is linear: numbers that the path stands at already are counted from there, with a prior
     about nothing."""
-    here, there = trial.at({}), trial.at({"drag": np.array([0.7])})
+    here, there = trial.linearise({}), trial.linearise({"drag": np.array([0.7])})
     one = level(trial, here, 1.0, ("drag",))
     other = level(trial, there, 1.0, ("drag",))
     assert other.value == pytest.approx(one.value, abs=1e-6)
@@ -56,7 +56,7 @@ def test_a_hypothesis_that_was_linearised_elsewhere_has_the_same_evidence(trial)
 
 def test_numbers_are_the_dense_posteriors(trial):
     """Mean and covariance of drag and of both numbers of `two`, by conditioning."""
-    point, included = trial.at({}), ("two", "drag")
+    point, included = trial.linearise({}), ("two", "drag")
     found, covariance = evidence.numbers_of(
         trial, level(trial, point, 1.0, included), point, included
     )
@@ -64,7 +64,7 @@ def test_numbers_are_the_dense_posteriors(trial):
     whole = c / SHARE + j @ nominal @ j.T + x @ x.T
     gain = np.linalg.solve(whole, x).T
     unit = trial.reference.columns.unit
-    unit = np.concatenate([unit[trial.reference.columns.of[n]] for n in included])
+    unit = np.concatenate([unit[trial.reference.columns.indices[n]] for n in included])
     assert np.concatenate(list(found.values())) == pytest.approx(
         unit * (gain @ (e - j @ mean)), rel=1e-5
     )
@@ -82,7 +82,7 @@ def test_parts_are_as_long_as_those_whose_differences_are_known(count, sizes):
     given = straight.passed(record, columns, np.zeros(len(columns.unit)))
     made = straight.campaign(record, given, columns, parts=4)
     later = straight.sailed(count, voyages=min(count // 6, 2) or 1, seed=1)
-    found = straight.Straight.of(made, later)
+    found = straight.Straight.build(made, later)
     assert [len(part) for part in found.parts] == sizes
 
 
@@ -90,7 +90,7 @@ def test_a_fixed_cause_stays_where_it_is(made):
     """As an extended model has it: no prior of its own pulls it back, and no data move it."""
     trial = straight.trial(*made, ("drag",))
     stands = {"drag": np.array([0.7])}
-    point = trial.at(stands)
+    point = trial.linearise(stands)
     found, covariance = evidence.numbers_of(
         trial, level(trial, point, 1.0, ("drag",)), point, ("drag",)
     )
@@ -109,7 +109,7 @@ def test_segments_left_out_say_nothing(made):
     found = []
     for one in (given, spoilt):
         trial = straight.trial(nominal, record, one)
-        point = trial.at({})
+        point = trial.linearise({})
         fit = Fit(point, evidence.fit(trial, point, ("drag", "two"), 1.0, Remainder()), Remainder())
         found.append(fits.refitted(trial, fit, out))
     (numbers, coefficients), (again, others) = found
@@ -127,7 +127,7 @@ def test_a_few_segments_do_not_decide(made):
     spoilt = given.e.copy()
     spoilt[3] += 40.0 * straight.NOISE * np.random.default_rng(1).standard_normal((15, 6))
     trial = straight.trial(nominal, record, replace(given, e=spoilt))
-    weight = evidence.robust(trial, trial.at({}))
+    weight = evidence.robust(trial, trial.linearise({}))
     assert weight[3] < 0.05
     assert (np.delete(weight, 3) > 0.9).all()
 
@@ -136,7 +136,7 @@ def test_the_distance_of_a_segment_is_the_dense_one(made, monkeypatch):
     """The residual of each segment in units of its covariance: weights are by its median."""
     nominal, record, given = made
     trial = straight.trial(nominal, record, given)
-    point = trial.at({})
+    point = trial.linearise({})
     best = max(evidence.levels(trial, point), key=lambda one: one.value)
     left = best.mean[: len(trial.reference.pull)]
     ref, chi2 = trial.reference, []
@@ -152,8 +152,8 @@ def test_the_distance_of_a_segment_is_the_dense_one(made, monkeypatch):
 
 def test_products_of_a_point_that_is_gone_are_not_taken_for_anothers(trial):
     """Points come and go while a fit converges, and one may stand where another stood in memory."""
-    first, there, last = (trial.at({"drag": np.array([size])}) for size in (0.1, 0.5, 0.7))
-    here = trial.at({"drag": np.array([0.0])})
+    first, there, last = (trial.linearise({"drag": np.array([size])}) for size in (0.1, 0.5, 0.7))
+    here = trial.linearise({"drag": np.array([0.0])})
     products = straight.trial(trial.campaign, trial.record, trial.given).products
 
     def total(point):
@@ -180,13 +180,13 @@ def test_segments_on_which_the_model_runs_away_carry_no_weight(made):
     lost[2] = True
     nominal, record, given = made
     away = replace(given, lost=lost)
-    trial, point = evidence.begin(straight.Straight.of(nominal, record, given=away), {})
+    trial, point = evidence.begin(straight.Straight.build(nominal, record, given=away), {})
     assert (trial.weight > 0.0).tolist() == (~lost).tolist()
     assert trial.begun and point.linear.lost.tolist() == lost.tolist()
-    trial.at({"drag": np.array([0.1])})  # the same one again is no failure
+    trial.linearise({"drag": np.array([0.1])})  # the same one again is no failure
     worse = replace(away, lost=lost | (np.arange(8) == 5))
     with pytest.raises(np.linalg.LinAlgError, match="diverges"):
-        replace(trial, given=worse).at({"drag": np.array([9.0])})
+        replace(trial, given=worse).linearise({"drag": np.array([9.0])})
     assert trial.weight[5] > 0.0
 
 
@@ -195,7 +195,7 @@ def test_a_model_that_diverges_on_every_segment_has_no_evidence(made):
     nominal, record, given = made
     lost = replace(given, lost=np.ones(8, dtype=bool))
     with pytest.raises(np.linalg.LinAlgError, match="every segment"):
-        evidence.begin(straight.Straight.of(nominal, record, given=lost), {})
+        evidence.begin(straight.Straight.build(nominal, record, given=lost), {})
 
 
 def test_the_model_as_it_stands_is_linearised_until_its_evidence_stays(made):
@@ -204,21 +204,21 @@ def test_the_model_as_it_stands_is_linearised_until_its_evidence_stays(made):
     asked: list[float] = []
 
     class Closing(straight.Straight):
-        def at(self, *more):
+        def linearise(self, *more):
             asked.append(3.0 * 0.1 ** len(asked))
             off = given.e + asked[-1] * np.sin(np.arange(given.e.size)).reshape(given.e.shape)
-            return straight.Straight.at(replace(self, given=replace(given, e=off)), *more)
+            return straight.Straight.linearise(replace(self, given=replace(given, e=off)), *more)
 
-    trial, point = evidence.begin(Closing.of(nominal, record, given=given), {})
+    trial, point = evidence.begin(Closing.build(nominal, record, given=given), {})
     at_end, _ = evidence.scan(trial, point, (), ())
-    closest, _ = evidence.scan(trial, straight.Straight.at(trial, {}), (), ())
+    closest, _ = evidence.scan(trial, straight.Straight.linearise(trial, {}), (), ())
     assert 3 < len(asked) < evidence.MOST_PATHS
     assert at_end.evidence == pytest.approx(closest.evidence, abs=evidence.LITTLE_NATS)
 
 
 def test_what_is_left_out_is_left_out_of_a_trial_of_its_own(trial):
     out = np.arange(8) == 3
-    less = trial.leaving_out(out)
+    less = trial.leave_out(out)
     assert less.weight.tolist() == (~out).astype(float).tolist()
     assert trial.weight.tolist() == [1.0] * 8
     assert less.first is trial.first and less.cache is trial.cache
@@ -229,8 +229,8 @@ def test_what_is_left_out_is_left_out_of_a_trial_of_its_own(trial):
 def test_products_without_a_voyage_are_those_of_segments_of_no_weight(trial, kind, out):
     """Of whole voyages, of a part of one, of parts of both, and of all that there is."""
     left_out = np.isin(np.arange(8), out)
-    point, remainder, products = trial.at({}), Remainder(kind), trial.products
-    found = products.leaving_out(point, 1.5, trial.weight, remainder, left_out)
+    point, remainder, products = trial.linearise({}), Remainder(kind), trial.products
+    found = products.leave_out(point, 1.5, trial.weight, remainder, left_out)
     weight = np.where(left_out, 0.0, trial.weight)
     fresh = straight.trial(trial.campaign, trial.record, trial.given).products
     wanted, _ = fresh.total(point, 1.5, weight, remainder)
@@ -264,16 +264,16 @@ def test_a_moment_is_no_larger_than_its_mass_can_make_it(trial, monkeypatch):
 def test_what_is_beyond_the_ship_costs_evidence_and_is_moved(trial, monkeypatch):
     """Evidence falls by the share of the posterior that is on board, over that of the prior."""
     monkeypatch.setattr(type(trial), "farthest", lambda _, name: math.inf)
-    point, included = trial.at({}), ("two",)
+    point, included = trial.linearise({}), ("two",)
     free = evidence.level(trial, point, 1.0, included)
     mean, covariance = evidence.numbers_of(trial, free, point, included)
     (first, second), size = mean["two"], trial.reference.columns.unit[
-        trial.reference.columns.of["two"]
+        trial.reference.columns.indices["two"]
     ]  # fmt: skip
     farthest = 0.5 * abs(second / first)
     monkeypatch.setattr(type(trial), "farthest", lambda _, name: farthest)
     bound = evidence.level(trial, point, 1.0, included)
-    wanted = bounds.log_on_board(np.array([first, second]), covariance, size, farthest)
+    wanted = bounds.log_share_on_board(np.array([first, second]), covariance, size, farthest)
     assert bound.value - free.value == pytest.approx(wanted)
     moved, _ = evidence.numbers_of(trial, bound, point, included)
     assert abs(moved["two"][1]) == pytest.approx(farthest * abs(moved["two"][0]))

@@ -23,7 +23,7 @@ from shiplog.diagnosis.trial.fitted import Fit
 @pytest.mark.parametrize("family", ("motion", "position", "heading", "time"))
 @pytest.mark.parametrize("included", ((), ("drag",)))
 def test_the_factor_of_a_change_is_the_difference_of_two_evidences(trial, family, included):
-    point = trial.at({})
+    point = trial.linearise({})
     base = level(trial, point, 1.4, included)
     gained, size = evidence.family_change(trial, point, base, included, family, Remainder())
     each = [level(trial, point, 1.4, included, family, s).value for s in remainder.CHANGE_SIZES]
@@ -37,16 +37,18 @@ def test_a_change_that_is_there_is_found_at_its_size(made):
     """In the trial alone, an acceleration by place, three times the process noise."""
     nominal, record, _ = made
     plain = straight.trial(*made)
-    family = next(f for f in plain.unseen.families if f.name == "position")
+    family = next(f for f in plain.omitted.families if f.name == "position")
     rng = np.random.default_rng(5)
-    weights = np.zeros(plain.unseen.count)
-    first = plain.unseen.families[0].columns[0]
+    weights = np.zeros(plain.omitted.count)
+    first = plain.omitted.families[0].columns[0]
     weights[family.columns - first] = 9.0 * rng.standard_normal(len(family.columns))
-    accelerations = plain.unseen.accelerations(plain.at({}).linear.cut, plain.grid) @ weights
+    accelerations = (
+        plain.omitted.accelerations(plain.linearise({}).linear.cut, plain.grid) @ weights
+    )
     columns = straight.columns_of(CAUSES)
     given = straight.passed(record, columns, seed=2, sensitivity=0.3, accelerations=accelerations)
     trial = straight.trial(nominal, record, given)
-    point = trial.at({})
+    point = trial.linearise({})
     base = level(trial, point, 1.0)
     gained = {
         name: evidence.family_change(trial, point, base, (), name, Remainder())
@@ -61,17 +63,19 @@ def test_a_change_that_is_there_is_found_at_its_size(made):
 def test_a_change_acts_on_the_channels_of_its_acceleration(made):
     nominal, record, _ = made
     plain = straight.trial(*made)
-    family = next(f for f in plain.unseen.families if f.name == "time")
-    weights = np.zeros(plain.unseen.count)
-    at = (family.columns - plain.unseen.families[0].columns[0])[3 * EVEN["time"] :]
+    family = next(f for f in plain.omitted.families if f.name == "time")
+    weights = np.zeros(plain.omitted.count)
+    at = (family.columns - plain.omitted.families[0].columns[0])[3 * EVEN["time"] :]
     each = len(at) // 3  # channel by channel: sway's are in the middle
     weights[at[each : 2 * each]] = 20.0
-    accelerations = plain.unseen.accelerations(plain.at({}).linear.cut, plain.grid) @ weights
+    accelerations = (
+        plain.omitted.accelerations(plain.linearise({}).linear.cut, plain.grid) @ weights
+    )
     given = straight.passed(
         record, straight.columns_of(CAUSES), seed=2, sensitivity=0.3, accelerations=accelerations
     )
     trial = straight.trial(nominal, record, given)
-    point = trial.at({})
+    point = trial.linearise({})
     base, _ = evidence.scan(trial, point, (), (), 1.0)
     assert fits.acts_on(trial, Fit(point, base, Remainder(RAISED)), "time") == ("sway",)
 
@@ -84,16 +88,16 @@ def test_what_a_family_does_as_well_is_the_share_that_lies_in_its_columns(made, 
     not act at the nodes, as process noise does, weighs far more."""
     nominal, record, given = made
     plain = straight.trial(*made)
-    family = next(f for f in plain.unseen.families if f.name == "time")
-    at = family.columns - plain.unseen.families[0].columns[0]
-    accelerations = plain.unseen.accelerations(given.cut, plain.grid)[..., at[3 * EVEN["time"]]]
+    family = next(f for f in plain.omitted.families if f.name == "time")
+    at = family.columns - plain.omitted.families[0].columns[0]
+    accelerations = plain.omitted.accelerations(given.cut, plain.grid)[..., at[3 * EVEN["time"]]]
     does = np.einsum("sbcz,sz->sbc", given.z[..., 6:], accelerations)
     weight = does.std((0, 1)) + 1e-12
     rest = np.random.default_rng(11).standard_normal(does.shape) * weight
     j, columns = given.j.copy(), straight.columns_of(CAUSES)
-    j[..., columns.of["drag"][0]] = 30.0 * (does + own * rest)
+    j[..., columns.indices["drag"][0]] = 30.0 * (does + own * rest)
     trial = straight.trial(nominal, record, replace(given, j=j))
-    point = trial.at({})
+    point = trial.linearise({})
     base, _ = evidence.scan(trial, point, (), ("drag",), 1.0)
     base.numbers["drag"] = np.ones(1)
     share = fits.imitated(trial, Fit(point, base, Remainder("time")), "drag", 1e4)
@@ -131,7 +135,7 @@ def test_levels_of_noise_differ_as_dense_gaussians_do(made):
     sure = replace(PROCESS_NOISE, start=np.full(6, 1e-5))
     ref = replace(nominal.reference, process_noise=sure)
     trial = straight.trial(replace(nominal, reference=ref), record, given)
-    point = trial.at({})
+    point = trial.linearise({})
     found, wanted = [], []
     for noise in (1.0, 1.4):
         one = level(trial, point, noise)
@@ -166,10 +170,10 @@ def test_the_best_level_is_the_one_that_was_drawn(made):
     )
     trial = straight.trial(nominal, record, given)
     raised = Remainder(RAISED)
-    levels = evidence.levels(trial, trial.at({}), remainder=raised)
+    levels = evidence.levels(trial, trial.linearise({}), remainder=raised)
     best = max(levels, key=lambda one: one.value)
     assert best.noise_factor == pytest.approx(2.0, rel=0.12)
-    again = evidence.levels(trial, trial.at({}), (), best.noise_factor, raised)
+    again = evidence.levels(trial, trial.linearise({}), (), best.noise_factor, raised)
     near = max(again, key=lambda one: one.value)
     assert near.noise_factor == pytest.approx(best.noise_factor, rel=0.02)
 
@@ -191,10 +195,10 @@ def test_a_fit_that_diverges_with_raised_noise_leaves_no_noise_to_explain(
         if count < failing:
             return fit
         gone = {"drag": np.array([np.nan])}
-        return replace(fit, found=replace(fit.found, evidence=-math.inf, numbers=gone))
+        return replace(fit, estimate=replace(fit.estimate, evidence=-math.inf, numbers=gone))
 
     def asked(fit):
-        assert np.isfinite([*fit.found.numbers.values()]).all()
+        assert np.isfinite([*fit.estimate.numbers.values()]).all()
         return straight.no_hull(fit)
 
     search = search_of(trial, point, estimate=asked)

@@ -45,7 +45,7 @@ def test_an_unrecorded_thruster_is_placed_where_it_stands(monkeypatch):
         np.zeros((count, 1, 6, 0)),
     )  # fmt: skip
     monkeypatch.setattr(likelihood, "weighed", lambda *_: weighed)
-    left = raised_noise.left_by(linear, np.zeros(0), afloat.PROCESS_NOISE, np.ones(count), 1.0)
+    left = raised_noise.residual(linear, np.zeros(0), afloat.PROCESS_NOISE, np.ones(count), 1.0)
     found = unrecorded_thruster.estimate_side_force(left, reference)
     assert found.lever == pytest.approx(1.1, abs=0.05)
     assert found.force == pytest.approx(1.7, rel=0.1)

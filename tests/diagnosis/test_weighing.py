@@ -33,7 +33,7 @@ def test_an_intermittent_force_is_tested_with_no_family(monkeypatch):
         search = search_of(trial, point, estimate=no_force)
         search.weigh((), {}, point)
         table = search.table
-        assert table.found[(), RAISED].found.noise_factor > 1.5
+        assert table.found[(), RAISED].estimate.noise_factor > 1.5
         assert asked[0].kind == RAISED
         assert ((), INTERMITTENT) not in table.found  # it gains nothing: it is raised noise
 
@@ -108,7 +108,7 @@ def test_an_intermittent_force_is_a_hypothesis_where_it_gains_more_than_raised_n
     one, raised = table.found[(), INTERMITTENT], table.found[(), RAISED]
     assert one.remainder.intermittent == pytest.approx(2.0 * unit)
     assert one.side_force.device == 0.5
-    again = evidence.level(trial, point, one.found.noise_factor, (), one.remainder)
+    again = evidence.level(trial, point, one.estimate.noise_factor, (), one.remainder)
     assert one.evidence == pytest.approx(again.value)
     assert one.evidence > raised.evidence + 5.0
 
@@ -153,3 +153,19 @@ def test_with_raised_noise_a_family_counts_where_it_alone_is_likelier_than_the_n
     change = weighing.change(either, either, "time")
     assert change.remainder == Remainder("time", 3.0, noisy)
     assert change.value == (pytest.approx(raised + gain) if noisy else -math.inf)
+
+
+@pytest.mark.parametrize("acts", [True, False])
+def test_what_explains_half_a_tenth_of_raised_noise_is_an_error_of_its_spectrum(acts, monkeypatch):
+    """The family alone is likelier than the noise, as parts differ by as much as the trial does."""
+    trial, point = trial_with({}, accelerations=raised_noise())
+    trial = replace(trial, campaign=replace(trial.campaign, noise=1.0))
+    of = replace(search_of(trial, point).cause_set(()), spectrum=acts)
+    levels = weighing.nominal_levels(trial, point, (), 1.0)
+    either = weighing.Rough(of, point, weighing.RAISING, levels)
+    gain = 0.5 * either.spectrum()
+    assert gain > 2.0
+    monkeypatch.setattr(evidence, "family_change", lambda *given: (gain, 3.0))
+    change = weighing.change(either, either, "time")
+    assert change.remainder == Remainder("time", 3.0, True)
+    assert change.value == (-math.inf if acts else pytest.approx(either.best.value + gain))

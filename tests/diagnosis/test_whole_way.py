@@ -143,14 +143,14 @@ def test_a_sign_that_is_the_other_way_round_is_found(sea, words):
     what a wrong sign does must not drown in what else is wrong."""
     cut, model = sea.done.held.cut, sea.done.after
     (turned,) = [
-        w for s, w in sign_conventions.windows_under_conventions(PROFILE, cut) if words in s
+        one.windows for one in sign_conventions.conventions(PROFILE, cut) if words in one.words
     ]
-    found, loss = sign_conventions.best(model, turned)
-    assert words in found
-    assert loss == pytest.approx(model.losses(cut).mean(), rel=1e-4)
+    found = sign_conventions.try_conventions(model, turned)
+    assert words in found.words
+    assert found.loss == pytest.approx(model.losses(cut).mean(), rel=1e-4)
     why = HeldOut(turned, model, sea.done.trial).lost(None)
     if "sign" in words:  # the others do not double the error of so short a trial
-        assert words in why and f"L is {loss:.0f}" in why
+        assert words in why and f"L is {found.loss:.0f}" in why
     assert HeldOut(cut, model, sea.done.trial).lost(None) == ""
 
 
@@ -161,7 +161,7 @@ def test_two_rudders_exchanged_are_told_by_the_evidence_of_both_orders(sea):
     known = {one.cause.label: one.numbers for one in sea.done.decision.named}
 
     def gained(observed):
-        trial, at = evidence.begin(Trial.of(campaign, observed, [*known]), known)
+        trial, at = evidence.begin(Trial.build(campaign, observed, [*known]), known)
         return exchanged_twins.gain(trial, at, known, pair)
 
     lost = gained(record)
@@ -197,7 +197,7 @@ def test_windows_feel_a_current_and_not_the_clock_of_the_position(sea):
     both = tuple(sorted((current.cause.label, clock)))
     numbers = {current.cause.label: current.numbers, clock: np.array([0.3])}
     fit = resume(trial, both, Remainder(), Start(numbers, decision.fit.point.path))
-    point, found = fit.point, fit.found
+    point, found = fit.point, fit.estimate
     by = {c.label: c for c in sea.campaign.reference.model.causes}
     late = replace(current, cause=by[clock], numbers=found.numbers[clock])
     joint = replace(decision, fit=Fit(point, found, Remainder()), named=(current, late))
@@ -240,7 +240,7 @@ def test_a_path_may_follow_a_force_that_comes_and_goes(sea):
     """By twice the acceleration of the process noise and of it together."""
     ref, intermittent = sea.campaign.reference, np.array([0.0, 0.02, 0.01])
     raised = Remainder("raised", channels=(1.0, 2.0, 1.0), intermittent=(0.0, 0.02, 0.01))
-    plain, pulsed = ref.held(1.5, Remainder()), ref.held(1.5, raised)
+    plain, pulsed = ref.allowed_distance(1.5, Remainder()), ref.allowed_distance(1.5, raised)
     assert pulsed.acceleration**2 == pytest.approx(
         (plain.acceleration * (1.0, 2.0, 1.0)) ** 2 + (2.0 * intermittent) ** 2
     )
@@ -253,16 +253,16 @@ def test_causes_converge_from_where_they_converged_before(compass):
     asked = []
 
     class Counted(Trial):
-        def at(self, numbers, *given):
+        def linearise(self, numbers, *given):
             asked.append(numbers)
-            return super().at(numbers, *given)
+            return super().linearise(numbers, *given)
 
-    again, point = evidence.begin(Counted.of(trial.campaign, trial.record), {})
+    again, point = evidence.begin(Counted.build(trial.campaign, trial.record), {})
     asked.clear()
     ends = []
     for begin in (0.5, -0.5):
         start = Start({label: np.array([begin])}, point.path)
-        found = resume(again, (label,), Remainder(), start).found
+        found = resume(again, (label,), Remainder(), start).estimate
         ends.append((len(asked), *found.numbers[label]))
         asked.clear()
     assert ends[0][0] > 2 and ends[1][0] == 1
@@ -273,9 +273,9 @@ def test_the_models_error_in_the_wind_tells_no_wind_force_from_an_anemometers_sc
     """A wind that is measured 1.2 times too strong has 1/1.2² of the force that the model gives."""
     trial, scale = sea.done.trial, {"wind_speed_scale": np.array([0.2])}
     force = {"wind_force": np.full(3, 1.2**-2 - 1.0)}
-    path = trial.at(scale).path
-    measured, scaled = trial.at(scale, path), trial.at(force, path)
-    assert measured.linear.cut.factors == trial.at({}).linear.cut.factors == {}
+    path = trial.linearise(scale).path
+    measured, scaled = trial.linearise(scale, path), trial.linearise(force, path)
+    assert measured.linear.cut.factors == trial.linearise({}).linear.cut.factors == {}
     assert scaled.linear.cut.factors["wind"] == pytest.approx(np.full(3, 1.2**-2))
     assert trial.covering(scaled).cut.factors["wind"] == pytest.approx(np.full(3, 1.2**-2))
     one, other = (evidence.level(trial, point, 1.0).value for point in (measured, scaled))

@@ -12,7 +12,7 @@ from shiplog.diagnosis.hypotheses import evidence
 from shiplog.diagnosis.hypotheses.evaluate import evaluate
 from shiplog.diagnosis.linear import linearisation, measurement_correction, segments
 from shiplog.diagnosis.noise.remainder import Remainder
-from shiplog.diagnosis.trial.fitted import Fit, Found, Start
+from shiplog.diagnosis.trial.fitted import Estimate, Fit, Start
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.diagnosis.verdict import result as decisions
 from shiplog.voyages.rows import timescale  # fmt: skip
@@ -101,17 +101,17 @@ def test_half_the_data_has_the_same_name(sea):
 def test_with_a_late_clock_the_other_instruments_are_read_at_its_time(sea):
     """An antenna's columns come from what is measured: 1.4 s apart they are other ones, and the
     position and the velocity would seem to disagree."""
-    trial = Trial.of(sea.campaign, sea.done.trial.record)
-    trial.at({})
+    trial = Trial.build(sea.campaign, sea.done.trial.record)
+    trial.linearise({})
     numbers = {"clock_offset:gnss": np.array([1.4])}
-    late = trial.at(numbers)
+    late = trial.linearise(numbers)
     ref = sea.campaign.reference
     cut, moved, observed = measurement_correction.read(
         ref.model, ref.setting, trial.record, trial.rows, numbers
     )
     whole = np.concatenate((ref.theta, ref.columns.numbers(numbers)))
     fresh = linearisation.linear(ref.model, whole, cut, trial.grid, late.path, moved, observed)
-    columns = ref.columns.of["antenna_offset"]
+    columns = ref.columns.indices["antenna_offset"]
     assert late.linear.j[..., columns] == pytest.approx(fresh.j[..., columns], abs=1e-5)
 
 
@@ -119,7 +119,7 @@ def test_what_a_clock_would_change_is_of_the_motion_and_not_of_its_noise(sea):
     """The column is the velocity's derivative. Were it that of what was measured, noise would pass
     for what the data tell: of noise as the sensor has it, 0.01 m/s, two fifths of it at most."""
     observed, ref = sea.done.trial.record, sea.campaign.reference
-    rows, column = sea.done.trial.rows, ref.columns.of["clock_offset:velocity"][0]
+    rows, column = sea.done.trial.rows, ref.columns.indices["clock_offset:velocity"][0]
     column -= ref.columns.base
     noise = np.zeros_like(observed.state)
     noise[:, 1] = 0.01 * np.random.default_rng(5).standard_normal(len(observed))
@@ -138,7 +138,7 @@ def test_what_a_lag_would_change_is_after_a_step_and_not_before(sea):
     observed, ref = sea.done.trial.record, sea.campaign.reference
     (lag,) = (c for c in ref.model.causes if c.label == "rudder_lag")
     time = measurement_correction.READ_STEP * lag.sizes(ref.setting)[0]
-    column = ref.columns.of["rudder_lag"][0] - ref.columns.base
+    column = ref.columns.indices["rudder_lag"][0] - ref.columns.base
     step = np.zeros_like(observed.actuator)
     step[1000:, 0] = 0.2
     stepped = replace(observed, actuator=step)
@@ -181,7 +181,7 @@ def test_a_fit_that_runs_away_is_worth_nothing(still, monkeypatch):
     monkeypatch.setattr(evidence, "levels", broken)
     path = decision.nothing.point.path
     start = Start({"current": np.zeros(2)}, path)
-    assert evaluate(trial, ("current",), Remainder(), start).found.evidence == -np.inf
+    assert evaluate(trial, ("current",), Remainder(), start).estimate.evidence == -np.inf
 
 
 def test_the_others_may_explain_far_less_without_a_cause(still, monkeypatch):
@@ -193,18 +193,18 @@ def test_the_others_may_explain_far_less_without_a_cause(still, monkeypatch):
         high = at[-1] > 0.15
         found = {"heading_offset": np.array([0.1])}
         value = seemed if high else converged
-        return Found("nothing", value, 1.0, found, np.eye(1) * 1e-4, density=value), []
+        return Estimate("nothing", value, 1.0, found, np.eye(1) * 1e-4, density=value), []
 
     def stands(_, numbers, *more):
         at.append(numbers["heading_offset"][0])
         return replace(decision.nothing.point, numbers=numbers)
 
-    monkeypatch.setattr(Trial, "at", stands)
+    monkeypatch.setattr(Trial, "linearise", stands)
     monkeypatch.setattr(evidence, "scan", scanned)
     monkeypatch.setattr(evidence, "fit", lambda *given: scanned(*given)[0])
     begin = {"heading_offset": np.array([0.16])}
     fit = evaluate(trial, ("heading_offset",), Remainder(), Start(begin, None))
-    assert fit.found.evidence == converged
+    assert fit.estimate.evidence == converged
 
 
 def test_where_the_others_run_away_without_a_cause_nothing_is_left(compass, monkeypatch):
@@ -214,9 +214,9 @@ def test_where_the_others_run_away_without_a_cause_nothing_is_left(compass, monk
         one, cause=next(c for c in trial.reference.model.causes if c.label == "current")
     )
     both = {one.cause.label: one.numbers, other.cause.label: one.numbers}
-    fit = replace(decision.fit, found=replace(decision.fit.found, numbers=both))
+    fit = replace(decision.fit, estimate=replace(decision.fit.estimate, numbers=both))
     two = replace(decision, named=(one, other), fit=fit)
-    gone = Found("heading_offset", -np.inf, 1.0, {one.cause.label: one.numbers})
+    gone = Estimate("heading_offset", -np.inf, 1.0, {one.cause.label: one.numbers})
     less = Fit(decision.fit.point, gone, fit.remainder)
     monkeypatch.setattr(decisions, "resume", lambda *_, **__: less)
     left = decisions.without_cause(trial, two, other)
@@ -227,7 +227,7 @@ def test_where_the_others_run_away_without_a_cause_nothing_is_left(compass, monk
 def test_a_fit_that_runs_away_takes_a_shorter_step(still, monkeypatch):
     """Three halvings at most; then it has no evidence. A path of kilometres diverged, too."""
     trial, decision = still
-    at, path = Trial.at, decision.nothing.point.path
+    at, path = Trial.linearise, decision.nothing.point.path
     away = []
 
     def bounded(self, numbers, *given):
@@ -237,19 +237,19 @@ def test_a_fit_that_runs_away_takes_a_shorter_step(still, monkeypatch):
             return replace(point, linear=replace(point.linear, e=point.linear.e + 1e5))
         return point
 
-    monkeypatch.setattr(Trial, "at", bounded)
+    monkeypatch.setattr(Trial, "linearise", bounded)
 
     def fitted(offset, lowest=-np.inf):
         start = Start({"heading_offset": np.array([offset])}, path)
-        return evaluate(trial, ("heading_offset",), Remainder(), start, lowest).found
+        return evaluate(trial, ("heading_offset",), Remainder(), start, lowest).estimate
 
     found = fitted(0.8)
     assert away == [0.8, 0.4] and abs(found.numbers["heading_offset"][0]) < 0.02
-    assert -30.0 < found.evidence - decision.nothing.found.evidence < thresholds.SHOWS_NATS
+    assert -30.0 < found.evidence - decision.nothing.estimate.evidence < thresholds.SHOWS_NATS
     away.clear()
     found = fitted(8.0)
     assert away == [8.0, 4.0, 2.0, 1.0] and found.evidence == -np.inf
     # nothing that converges is so high: each step went too far
-    low = decision.nothing.found.evidence + 900.0
+    low = decision.nothing.estimate.evidence + 900.0
     found = fitted(0.01, low)
     assert found.evidence == -np.inf

@@ -53,7 +53,7 @@ def judged(campaign, observed, sets=2):
 
     sets  of causes that are searched: here one cause acts at most, found when each is tried alone
     """
-    trial, point = evidence.begin(Trial.of(campaign, observed), {})
+    trial, point = evidence.begin(Trial.build(campaign, observed), {})
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(search, "MOST_SETS", sets)
         found = search.Search(trial, point, placebo.placebos(campaign))

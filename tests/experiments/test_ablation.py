@@ -89,10 +89,29 @@ def test_every_part_is_taken_out_by_a_switch_of_its_own():
         }.get(part, {part})  # fmt: skip
 
 
+PAGE = Path(__file__).parents[2] / "docs" / "evidence" / "ablation.md"
+
+
+def test_a_part_that_changes_no_answer_has_a_test_that_needs_it():
+    """The page lists those of which both of its tables have no other answer."""
+    page = PAGE.read_text(encoding="utf-8")
+    other: dict[str, int] = {}
+    for line in page.splitlines():
+        cells = [cell.strip() for cell in line.split("|")[1:-1]]
+        if len(cells) == 6 and cells[0] in without.PARTS and cells[5].isdecimal():
+            other[cells[0]] = other.get(cells[0], 0) + int(cells[5])
+    idle = [part for part in other if part != without.WHOLE and not other[part]]
+    assert set(other) == set(without.PARTS) and set(idle) == set(ablation.CASES)
+    assert page.endswith("\n\n".join(ablation.needed(idle)) + "\n")
+    for _, file, test in ablation.CASES.values():
+        text = (PAGE.parents[2] / file).read_text(encoding="utf-8")
+        assert f"\ndef {test}(" in text, test
+
+
 @pytest.mark.parametrize("part", list(without.ESTIMATES))
 def test_what_is_replaced_in_the_nominal_fit_comes_back(part):
     watched = {
-        "discrepancy": (discrepancy, "SEEN"),
+        "discrepancy": (discrepancy, "MODELLED"),
         "robust-weights": (campaign_characteristics, "robust_weights"),
     }  # fmt: skip
     before = getattr(*watched[part])

@@ -207,9 +207,9 @@ def test_a_trial_whose_model_has_a_discrepancy_is_compared_without_it():
     campaign = straight.campaign(nominal, passed, columns)
     assert campaign.reference.columns.misfit > 0
     hidden = np.zeros(columns.linearised)
-    hidden[columns.of["drag"]] = 1.5
+    hidden[columns.indices["drag"]] = 1.5
     given = straight.passed(record, columns, hidden, seed=2, noise=0.3, sensitivity=0.3)
     trial = straight.trial(campaign, record, given)
-    found = rivals.likelihood_ratio(trial, trial.at({}))
+    found = rivals.likelihood_ratio(trial, trial.linearise({}))
     assert found.answer == "drag"
     assert set(found.scores) == {c.label for c in straight.CAUSES}

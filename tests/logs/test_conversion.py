@@ -12,7 +12,7 @@ from shiplog.exceptions import ChannelMissing, ProfileError
 from shiplog.logs.conversion import clock, heartbeat
 from shiplog.logs.conversion.columns import schema_of
 from shiplog.logs.conversion.delimited import read_table
-from shiplog.logs.conversion.nmea import is_nmea, read_nmea
+from shiplog.logs.conversion.nmea import is_nmea, read_nmea_log
 from shiplog.logs.conversion.topics import folder_to_series
 from shiplog.ship_profile import file as profiles
 from shiplog.voyages.ingest.ingest import ingest
@@ -63,6 +63,12 @@ sog = "sog"
 cog = { channel = "cog", unit = "deg" }
 """
 RUNS = PROFILE + 'run = "voyage"\n'
+
+
+def read_nmea(path):
+    """Series of a text, and how many of its sentences were damaged."""
+    found = read_nmea_log([path], path.name)
+    return found.series, found.damaged
 
 
 def test_a_missing_yaw_rate_is_differentiated_and_reported(tmp_path, caplog):

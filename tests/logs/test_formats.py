@@ -30,4 +30,4 @@ def test_the_first_format_that_takes_a_path_is_its_own(tmp_path, name, content, 
     """Its content counts for more than its name, where there is some."""
     path = Path(tmp_path / name)
     path.mkdir() if content is None else path.write_text(content)
-    assert formats.of(path).name == wanted
+    assert formats.recognise(path).name == wanted

@@ -16,7 +16,7 @@ KNOT = 1852.0 / 3600.0
 
 def facts(line):
     """Topic to values and reason of a line with or without a checksum."""
-    (one,) = Lines().of(line)
+    (one,) = Lines().accept(line)
     read = vdo if one.kind == "VDO" else SENTENCES[one.kind]
     return {fact.topic: (fact.values, fact.why_not) for fact in read(one.fields, one.vouched)}
 

@@ -5,7 +5,7 @@ import polars as pl
 import pytest
 
 from shiplog.exceptions import ProfileError
-from shiplog.logs.conversion.steps_back import along, of_one_recording
+from shiplog.logs.conversion.steps_back import explain_steps, of_one_recording
 
 SECOND = 1_000_000_000
 WEEK, DAY = 604_800, 86_400
@@ -32,7 +32,7 @@ def kinds(found):
 @pytest.mark.parametrize("left", [0.2, 17.3, 300.0])
 def test_a_counter_that_wraps_counts_on(count, left):
     truth = count - left + T
-    found = along(ns(truth % count))
+    found = explain_steps(ns(truth % count))
     assert (found.time - found.time[0]) * 1e-9 == pytest.approx(T, abs=2e-3)
     assert not found.part.any()
     assert kinds(found) == ["wrapped"]
@@ -40,19 +40,19 @@ def test_a_counter_that_wraps_counts_on(count, left):
 
 def test_two_wraps_and_a_signed_counter():
     t = np.arange(0.0, 200.0, 0.2) + 40.0
-    found = along(ns(t % 65.536))
+    found = explain_steps(ns(t % 65.536))
     assert (found.time - found.time[0]) * 1e-9 == pytest.approx(t - 40.0, abs=2e-3)
     assert found.findings[0][1].value == 3.0
     signed = (T + 2**31 * 1e-6 - 50.0 + 2**31 * 1e-6) % (2**32 * 1e-6) - 2**31 * 1e-6
-    assert (along(ns(signed)).time - ns(signed)[0]) * 1e-9 == pytest.approx(T, abs=2e-3)
+    assert (explain_steps(ns(signed)).time - ns(signed)[0]) * 1e-9 == pytest.approx(T, abs=2e-3)
 
 
 @pytest.mark.parametrize("left", [3.0, 200.0])
 def test_1024_weeks_are_counted_on_from_either_side(left):
     rolled = JUNE + T - np.where(left <= T, 1024 * WEEK, 0.0)
-    found = along(ns(rolled))
+    found = explain_steps(ns(rolled))
     assert found.time * 1e-9 == pytest.approx(JUNE + T, abs=2e-3)
-    found = along(ns(JUNE + T - np.where(left <= T, 0.0, 1024 * WEEK)))
+    found = explain_steps(ns(JUNE + T - np.where(left <= T, 0.0, 1024 * WEEK)))
     assert found.time * 1e-9 == pytest.approx(JUNE + T, abs=2e-3)
     assert kinds(found) == ["wrapped"]
 
@@ -67,17 +67,17 @@ def test_a_date_that_changes_some_rows_off_midnight_is_put_right(rows, late):
         off[midnight : midnight + rows] = -DAY
     else:
         off[midnight - rows : midnight] = DAY
-    assert along(ns(t + off)).time * 1e-9 == pytest.approx(t, abs=2e-3)
+    assert explain_steps(ns(t + off)).time * 1e-9 == pytest.approx(t, abs=2e-3)
 
 
 def test_the_end_and_the_beginning_of_summer_time_are_counted_on():
     t = np.arange(0.0, 4 * 3600.0, 1.0)
     local = AUTUMN + t - np.where(AUTUMN + t >= 1_729_998_000, 3600.0, 0.0)  # 03:00 is 02:00
-    found = along(ns(local))
+    found = explain_steps(ns(local))
     assert (found.time - found.time[0]) * 1e-9 == pytest.approx(t)
     assert (kinds(found), found.part.max()) == (["clock_offset"], 0)
     begin = 1_711_848_600  # 2024-03-31 01:30:00
-    found = along(ns(begin + t + np.where(begin + t >= 1_711_850_400, 3600.0, 0.0)))
+    found = explain_steps(ns(begin + t + np.where(begin + t >= 1_711_850_400, 3600.0, 0.0)))
     assert (found.time - found.time[0]) * 1e-9 == pytest.approx(t)
     assert kinds(found) == ["clock_offset"]
 
@@ -90,7 +90,7 @@ def test_a_recorder_that_was_started_again_makes_a_second_part(start, length, hz
     rng = np.random.default_rng(0)
     jitter = rng.uniform(0.0, 0.02, len(first) + len(second))
     t = ns(start + np.concatenate((first, second)) + jitter)
-    found = along(t)
+    found = explain_steps(t)
     assert (found.time == t).all()
     assert (found.part == np.repeat([0, 1], [len(first), len(second)])).all()
     assert [(of, f.kind) for of, f in found.findings] == [(0, "restarted"), (1, "restarted")]
@@ -100,7 +100,7 @@ def test_a_recorder_that_was_started_again_makes_a_second_part(start, length, hz
 @pytest.mark.parametrize("back", [0.9, 2.5, 7.0, 100.0])
 def test_a_clock_that_was_set_back_while_it_recorded_makes_a_second_part(back):
     t = JUNE + T - np.where(T < 300.0, 0.0, back)
-    found = along(ns(t))
+    found = explain_steps(ns(t))
     assert (found.part == (T >= 300.0)).all()
 
 
@@ -112,16 +112,16 @@ def test_rows_that_were_written_late_are_late():
     halves = np.concatenate((rows[1500:], rows[:1500]))
     shuffled = np.random.default_rng(0).permutation(rows)
     for order in (swapped, block, halves, rows[::-1], shuffled):
-        found = along(ns(JUNE + T[order]))
+        found = explain_steps(ns(JUNE + T[order]))
         assert not found.part.any() and found.findings == ()
         assert sorted(found.time.tolist()) == ns(JUNE + T).tolist()
-    found = along(ns(T[halves]))  # two files of one count, in the wrong order
+    found = explain_steps(ns(T[halves]))  # two files of one count, in the wrong order
     assert not found.part.any()
 
 
 def test_a_table_of_one_instrument_after_the_other_is_one_recording():
     t = np.concatenate((T, T + 0.03))
-    found = along(ns(JUNE + t), np.repeat([3, 8], len(T)))
+    found = explain_steps(ns(JUNE + t), np.repeat([3, 8], len(T)))
     assert not found.part.any() and found.findings == ()
 
 
@@ -129,14 +129,14 @@ def test_a_table_of_one_instrument_after_the_other_is_one_recording():
 def test_utc_over_a_change_of_time_or_date_is_left_alone(start):
     t = start + np.arange(0.0, 7200.0, 0.5)
     t[5000:] += 3600.0  # a pause of an hour
-    found = along(ns(t))
+    found = explain_steps(ns(t))
     assert (found.time == ns(t)).all() and found.findings == ()
 
 
 def test_more_starts_than_a_recorder_has_are_refused_by_name():
     t = np.tile(np.arange(0.0, 60.0, 0.2), 25)
     with pytest.raises(ProfileError, match="not started so often") as error:
-        along(ns(t))
+        explain_steps(ns(t))
     assert "[table]" in (error.value.hint or "")
 
 

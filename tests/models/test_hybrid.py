@@ -166,7 +166,7 @@ def table(data: WindowSeries) -> pl.DataFrame:
 
 def test_it_sees_what_coverage_measures(hybrid, data):
     """The same columns in the same order, standardised alike, the same limit of distance."""
-    observed = coverage.of(table(data), PROFILE.actuator_names, has_wind=True)
+    observed = coverage.learn(table(data), PROFILE.actuator_names, has_wind=True)
     net = hybrid.residual
     assert observed.names == ("surge", "sway", "yaw_rate", "azimuth", "thruster",
                           "wind_ahead", "wind_starboard")  # fmt: skip
@@ -229,7 +229,7 @@ def test_the_parts_of_the_force_move_the_ship(part, physics, hybrid, theta, trai
     model, numbers = {"mmg": (physics, theta), "hybrid": (hybrid, trained)}[part]
     seconds = table(data)[::7]
     simulator = Simulator(model, numbers, np.zeros((len(numbers),) * 2))
-    found = force_breakdown.along(simulator, seconds, PROFILE)
+    found = force_breakdown.break_down(simulator, seconds, PROFILE)
     assert found.columns == ["voyage", "time", "part", "surge", "sway", "yaw"]
     named = ["hull", "thruster", "wind", *(["network"] if part == "hybrid" else []), "total"]
     order = found["part"].unique(maintain_order=True).to_list()
@@ -267,7 +267,7 @@ def test_the_forces_of_a_ship_without_wind_sensor_are_those_of_a_calm(data):
     g, main, _ = geometry_of(ship)
     numbers = estimated(g, main).values
     seconds = table(data).drop("wind_speed", "wind_angle")[:9]
-    found = force_breakdown.along(Simulator(MMG(g), numbers, np.zeros((2, 2))), seconds, ship)
+    found = force_breakdown.break_down(Simulator(MMG(g), numbers, np.zeros((2, 2))), seconds, ship)
     assert found["part"].unique(maintain_order=True).to_list() == ["hull", "thruster", "total"]
     assert found.height == 3 * 9
 

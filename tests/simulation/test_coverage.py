@@ -22,7 +22,7 @@ def seconds(count, wind_from, seed, surge=0.3):
 
 @pytest.fixture
 def trained():
-    return coverage.of(seconds(3000, 0.0, 0), ("rudder",), has_wind=True)
+    return coverage.learn(seconds(3000, 0.0, 0), ("rudder",), has_wind=True)
 
 
 def test_more_of_the_same_is_covered(trained):
@@ -54,22 +54,22 @@ def test_a_speed_never_sailed_is_named_and_the_wind_is_not(trained):
 
 def test_a_hole_in_the_middle_of_the_training_speeds_is_outside():
     slow, fast = seconds(1500, 0.0, 0, surge=0.0), seconds(1500, 0.0, 1, surge=1.2)
-    trained = coverage.of(pl.concat([slow, fast]), ("rudder",), has_wind=True)
+    trained = coverage.learn(pl.concat([slow, fast]), ("rudder",), has_wind=True)
     between = seconds(200, 0.0, 2, surge=0.6)
-    assert trained.outside(between)["surge"].mean() > 0.95
-    assert trained.outside(fast)["surge"].mean() == 0.0
+    assert trained.mark_outside(between)["surge"].mean() > 0.95
+    assert trained.mark_outside(fast)["surge"].mean() == 0.0
 
 
 def test_the_paper_s_wind_bins_do_not_jump_at_the_bow():
     training = seconds(3000, 0.0, 0)
     turned = training.with_columns(wind_angle=pl.col("wind_angle") + 2 * np.pi)
-    trained = coverage.of(training, ("rudder",), has_wind=True)
+    trained = coverage.learn(training, ("rudder",), has_wind=True)
     assert trained.distance(turned).max() < 1e-6
-    assert not trained.outside(turned)["wind"].any()
+    assert not trained.mark_outside(turned)["wind"].any()
 
 
 def test_a_ship_without_wind_sensor_has_no_wind_to_leave():
     training = seconds(500, 0.0, 0).drop("wind_speed", "wind_angle")
-    trained = coverage.of(training, ("rudder",), has_wind=False)
-    assert "wind" not in trained.outside(training)
+    trained = coverage.learn(training, ("rudder",), has_wind=False)
+    assert "wind" not in trained.mark_outside(training)
     assert (trained.distance(training) == 0.0).all()

@@ -73,9 +73,9 @@ def test_each_cause_of_an_extension_has_its_numbers_and_their_covariance(count):
     facts = {"causes": causes, "shares": {}, "lengths": {}}
     if count != 3:
         with pytest.raises(ValueError, match=f"bank has {count} numbers, not 3"):
-            Extension.of(facts, arrays)
+            Extension.from_record(facts, arrays)
         return
-    kept = Extension.of(facts, arrays)
+    kept = Extension.from_record(facts, arrays)
     assert kept.numbers["bank"].tolist() == [0.7] * 3
     assert kept.covariance["bank"].tolist() == np.diag([1.0, 2.0, 3.0]).tolist()
     assert kept.numbers["yaw_rate_bias"].tolist() == [0.001]

@@ -108,7 +108,7 @@ def test_several_networks_at_once_are_each_by_itself(shape):
           for name in ("velocity", "driven", "dt"))
     )  # fmt: skip
     weights = [torch.stack(of) for of in zip(*lists, strict=True)]
-    losses, gradients = network_gradient.together(weights, all_windows, scale, shape)
+    losses, gradients = network_gradient.joint_gradient(weights, all_windows, scale, shape)
     for number, (own, batch) in enumerate(zip(lists, batches, strict=True)):
         loss, expected = network_gradient.by_torch(own, batch, scale, shape)
         assert float(losses[number]) == pytest.approx(loss, rel=1e-12)

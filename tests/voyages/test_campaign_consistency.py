@@ -11,7 +11,7 @@ from shiplog.voyages.contradictions import gross as contradictions
 from shiplog.voyages.contradictions.gross import Contradictions
 from shiplog.voyages.ingest.ingest import ingest
 from shiplog.voyages.sensors import campaign_consistency, sensor_consistency
-from shiplog.voyages.sensors.campaign_consistency import campaign, deviates, seasons, together
+from shiplog.voyages.sensors.campaign_consistency import campaign, deviates, join, seasons
 from shiplog.voyages.sensors.sensor_findings import Estimate
 from shiplog.voyages.store.store import Store
 
@@ -81,14 +81,14 @@ def test_a_voyage_that_deviates_is_named_and_no_other(of):
 
 def test_voyages_do_not_run_into_each_other():
     one, other = motion(0, 30.0), motion(1, 20.0)
-    both = together([one, other])
+    both = join([one, other])
     assert np.flatnonzero(both.starts).tolist() == [0, 300]
     assert len(both.heading) == 500 and both.position.shape == (500, 2)
 
 
 def test_a_long_voyage_leaves_room_for_the_others(monkeypatch):
     monkeypatch.setattr(campaign_consistency, "CAMPAIGN_ROWS", 400)
-    both = together([motion(0, 100.0), motion(1, 10.0)])
+    both = join([motion(0, 100.0), motion(1, 10.0)])
     assert np.flatnonzero(both.starts).tolist() == [0, 200] and len(both.starts) == 300
 
 

@@ -17,7 +17,7 @@ NAN = math.nan
      (NAN, NAN, (NAN, NAN)), (-0.1, NAN, (-0.1, NAN))],
 )  # fmt: skip
 def test_near_rest_the_velocity_is_known(speed, course, velocity):
-    np.testing.assert_equal(empty_course.known(np.array([[speed, course]])), [velocity])
+    np.testing.assert_equal(empty_course.fill(np.array([[speed, course]])), [velocity])
 
 
 def test_how_many_have_no_course_is_said_once():

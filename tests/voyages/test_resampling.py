@@ -15,7 +15,9 @@ def samples(time_s, value, tolerance=None):
 
 def test_a_straight_line_is_exact_whatever_the_phase():
     time = np.arange(0.0, 10.0, 0.1) + 0.037
-    placed = resampling.onto(resampling.grid(S, 9 * S), samples(time, 3.0 - 2.0 * time))
+    placed = resampling.interpolate_samples(
+        resampling.grid(S, 9 * S), samples(time, 3.0 - 2.0 * time)
+    )
     assert not placed.gap.any()
     assert placed.value[:, 0] == pytest.approx(3.0 - 2.0 * np.arange(1.0, 9.05, 0.1), abs=1e-9)
 
@@ -23,26 +25,28 @@ def test_a_straight_line_is_exact_whatever_the_phase():
 def test_a_sample_on_the_grid_is_passed_through():
     time = np.arange(0.0, 2.0, 0.1)
     value = np.random.default_rng(0).normal(size=20)
-    placed = resampling.onto(resampling.grid(0, int(1.9 * S)), samples(time, value))
+    placed = resampling.interpolate_samples(resampling.grid(0, int(1.9 * S)), samples(time, value))
     assert placed.value[:, 0].tolist() == value.tolist()
 
 
 def test_a_missing_sample_is_a_gap_and_not_the_last_value():
     time = np.delete(np.arange(0.0, 5.0, 0.1), [20, 21, 22])
-    placed = resampling.onto(resampling.grid(0, int(4.9 * S)), samples(time, time))
+    placed = resampling.interpolate_samples(resampling.grid(0, int(4.9 * S)), samples(time, time))
     assert np.flatnonzero(placed.gap).tolist() == [20, 21, 22]
     assert np.isnan(placed.value[20:23]).all()
 
 
 def test_a_slow_instrument_is_interpolated_within_its_own_period():
     time = np.arange(0.0, 10.1, 0.5)
-    placed = resampling.onto(resampling.grid(0, 10 * S), samples(time, time**1))
+    placed = resampling.interpolate_samples(resampling.grid(0, 10 * S), samples(time, time**1))
     assert not placed.gap.any()
     assert placed.value[3, 0] == pytest.approx(0.3)
 
 
 def test_outside_the_samples_there_is_nothing():
-    placed = resampling.onto(resampling.grid(0, 3 * S), samples([1.0, 1.1, 1.2], [1, 2, 3]))
+    placed = resampling.interpolate_samples(
+        resampling.grid(0, 3 * S), samples([1.0, 1.1, 1.2], [1, 2, 3])
+    )
     assert np.flatnonzero(~placed.gap).tolist() == [10, 11, 12]
 
 
@@ -50,7 +54,7 @@ def test_nan_is_blank_not_a_gap():
     time = np.arange(0.0, 2.0, 0.1)
     value = np.ones(20)
     value[7] = np.nan
-    placed = resampling.onto(resampling.grid(0, int(1.9 * S)), samples(time, value))
+    placed = resampling.interpolate_samples(resampling.grid(0, int(1.9 * S)), samples(time, value))
     assert placed.blank[7] and not placed.gap[7]
     assert np.isnan(placed.value[7, 0])
     assert not placed.blank[[5, 9]].any()

@@ -88,7 +88,7 @@ def test_what_drives_a_node_is_the_mean_of_the_rows_about_it():
     ramp = replace(closed.record(profiles.load("esso-osaka")), timescale=Timescale(60.0, 4.0, 4.0))
     g, rows = segments.grid(ramp), segments.begins(ramp)
     values = np.random.default_rng(0).standard_normal((len(ramp), 2))
-    found = segments.at_instants(ramp, rows, values)
+    found = segments.average_at_instants(ramp, rows, values)
     assert g.every == 4
     at = rows[1] + 7 * 4
     row = 0.5 * (values[at - 2] + values[at + 2]) + values[at - 1 : at + 2].sum(0)
@@ -100,5 +100,5 @@ def test_without_a_row_there_is_no_speed_to_scale_by(empty):
     """The campaigns stay as they are; that they are too short for a verdict is reported later."""
     none = replace(RECORD, state=RECORD.state[:0], voyage=RECORD.voyage[:0], time=RECORD.time[:0])
     nominal, recorded = (RECORD, none) if empty == "trial" else (none, RECORD)
-    given = trial_voyages.in_ship_time(None, nominal, recorded)
+    given = trial_voyages.rescale_time(None, nominal, recorded)
     assert given[0] is nominal and given[1] is recorded

@@ -64,7 +64,7 @@ def by_limits(port, starboard, own, other):
     rows, _ = rudders(lambda t, helm: helm)
     t = np.linspace(0.0, 1.0, rows.height)
     rows = rows.with_columns(port=port(t), starboard=starboard(t))
-    return twins.by_limits(rows, profile(actuators=limited(own, other)))
+    return twins.find_exchanged(rows, profile(actuators=limited(own, other)))
 
 
 OUT, IN = (-1.8, 0.6), (-0.6, 1.8)  # rad, of a pair that goes further outboard than inboard

@@ -59,6 +59,56 @@ MEANING = {
     "pattern": "a force is one device where an on/off course is more probable",
 }
 
+# Of a part that changes no answer of the cases: what happens without it elsewhere, and the test
+# that fails without it.
+CASES = {
+    "placebo": (
+        "a cause is named that one nominal voyage seems to have by as much",
+        "tests/diagnosis/test_search.py", "test_a_placebo_is_taken_off",
+    ),
+    "form-error": (
+        "next to a bank that explains 5000 nats a cause is named that makes up for the error of "
+        "its equations: a fifth, which is 200 nats",
+        "tests/experiments/test_ablation.py", "test_without_form_errors_no_cause_has_one",
+    ),
+    "robust-weights": (
+        "one segment of eight has errors that no ship has, and decides",
+        "tests/diagnosis/test_trial.py", "test_a_few_segments_do_not_decide",
+    ),
+    "baseline": (
+        "a model that has no sway force of its rudder is diagnosed, and causes make up for that",
+        "tests/diagnosis/test_baseline_check.py",
+        "test_a_force_that_the_model_does_not_have_is_named_by_its_channel",
+    ),
+    "spectrum": (
+        "a change that explains a twentieth of raised noise is taken for an unknown force",
+        "tests/diagnosis/test_weighing.py",
+        "test_what_explains_half_a_tenth_of_raised_noise_is_an_error_of_its_spectrum",
+    ),
+    "time-scale": (
+        "a ship of L_pp/U = 76 s has segments of 30 s instead of 240 s; no answer is known that "
+        "changes with it",
+        "tests/voyages/test_timescale.py",
+        "test_larger_and_slower_ships_have_longer_segments",
+    ),
+    "practical-size": (
+        "a cause that is certainly there, at a tenth of the size that matters, is named instead of "
+        "listed as a trace",
+        "tests/diagnosis/test_decision_parts.py",
+        "test_a_cause_that_is_there_but_does_not_matter_is_a_trace",
+    ),
+    "ordinary-spreads": (
+        "where noise differs by a factor of 1.8 from nominal voyage to nominal voyage, a trial "
+        "with twice the nominal noise is unknown instead of none",
+        "tests/diagnosis/test_decision_parts.py",
+        "test_voyages_of_all_weathers_make_a_trial_of_any_of_them_an_ordinary_one",
+    ),
+}  # fmt: skip
+NEEDED = """\
+## Parts that change none of these answers
+
+The cases do not show what these parts are for. Each has a test that fails without it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Pair:
@@ -94,13 +144,15 @@ def answers_in(folder: Path) -> dict[str, tuple[Answer, ...]]:
 def page(tests: Sequence[Mapping[str, Sequence[Answer]]]) -> str:
     """Markdown; of each test the answers without each part, those of `WHOLE` among them. Raises
     `validation.Mixed` where those are of several programs."""
-    parts = [TITLE, COMMAND, INTRODUCTION]
+    parts, changed, tried = [TITLE, COMMAND, INTRODUCTION], set(), {WHOLE: None}
     for found in tests:
         whole = {answer.planned: answer for answer in found[WHOLE]}
         pairs = {
             part: [Pair(whole[a.planned], a) for a in answers if a.planned in whole]
             for part, answers in found.items()
         }
+        changed |= {part for part, given in pairs.items() if any(pair.differ for pair in given)}
+        tried |= dict.fromkeys(pairs)
         place = heading(goals.OTHER if all(a.abroad for a in found[WHOLE]) else goals.SAME)
         parts += [
             f"## {place}: {counted(len(whole), 'case')}",
@@ -109,7 +161,15 @@ def page(tests: Sequence[Mapping[str, Sequence[Answer]]]) -> str:
             "### Where an answer becomes another",
             _changes(pairs),
         ]
-    return "\n\n".join(parts)
+    idle = [part for part in tried if part not in changed and part in CASES]
+    return "\n\n".join([*parts, *needed(idle)])
+
+
+def needed(idle: Sequence[str]) -> list[str]:
+    """Of parts that changed no answer, a section with what each is for."""
+    rows = [(part, case, f"`{test}` in `{file}`") for part in idle
+            for case, file, test in [CASES[part]]]  # fmt: skip
+    return [NEEDED, tables.table(("without", "what happens then", "test"), rows)] if rows else []
 
 
 def _counts(pairs: Mapping[str, Sequence[Pair]]) -> str:

@@ -117,7 +117,7 @@ def regression(trial: Trial, fitted: np.ndarray, usual: Record) -> Ranked:
         if cause.label in trial.fixed:
             continue
         own = []
-        for i in columns.of[cause.label]:
+        for i in columns.indices[cause.label]:
             q, step = i - columns.base, float(measurement_correction.READ_STEP * columns.unit[i])
             low, high = (
                 beyond(
@@ -201,7 +201,7 @@ def likelihood_ratio(trial: Trial, point: Point) -> Ranked:
     ref = trial.reference
     assert ref.nominal is not None
     before = learnt(ref.nominal, ref.columns, ref.wide.start, ref.wide.noise)
-    tried = {c.label: ref.columns.of[c.label] for c in ref.model.causes}
+    tried = {c.label: ref.columns.indices[c.label] for c in ref.model.causes}
     tried = {label: at for label, at in tried.items() if label not in trial.fixed}
     total = white_total(point.linear, before.noise, ref.wide.start, _units(ref.columns))
     found = ratios(total, before.information, before.pull, tried)
@@ -219,7 +219,7 @@ def learnt(linear: Linear, columns: Columns, start: np.ndarray, noise: np.ndarra
     numbers = np.zeros(len(unit))
     for _ in range(ROUNDS):
         total = white_total(linear, noise, start, unit)[: base + 1, : base + 1]
-        known = np.diag(columns.known[:base])
+        known = np.diag(columns.prior_information[:base])
         numbers[:base] = np.linalg.solve(total[1:, 1:] + known, total[1:, 0]) * unit[:base]
         z, covariance = likelihood.starts_and_accelerations(alone, numbers, _quiet(noise, start))
         gap = linear.e - linear.j @ numbers - np.einsum("sbcz,sz->sbc", alone.z, z)
@@ -227,7 +227,7 @@ def learnt(linear: Linear, columns: Columns, start: np.ndarray, noise: np.ndarra
         used = linear.cut.used
         noise = np.sqrt(np.where(used, gap**2 + spread, 0.0).sum((0, 1)) / used.sum((0, 1)))
     total = white_total(linear, noise, start, unit)[: base + 1, : base + 1]
-    return White(noise, total[1:, 1:] + np.diag(columns.known[:base]), total[1:, 0])
+    return White(noise, total[1:, 1:] + np.diag(columns.prior_information[:base]), total[1:, 0])
 
 
 def _units(columns: Columns) -> np.ndarray:

@@ -66,9 +66,9 @@ def _no_discrepancy(stack: ExitStack) -> None:
     does not hold the part."""
 
     def converged(*given):
-        return nominal_fit.converged(*given, seen=discrepancy.SEEN)
+        return nominal_fit.converged(*given, seen=discrepancy.MODELLED)
 
-    stack.enter_context(patch.object(discrepancy, "SEEN", ()))
+    stack.enter_context(patch.object(discrepancy, "MODELLED", ()))
     stack.enter_context(patch.object(nominal_cache, "converged", converged))
     _learned_anew(stack)
 

@@ -90,11 +90,11 @@ def _row(search: Search, one: Hypothesis, share: float) -> tuple[object, ...]:
 def numbers(search: Search) -> str:
     """The causes' numbers of the best hypothesis, SI, and their standard deviations."""
     best = search.table.ranked()[0]
-    covariance = best.found.covariance
+    covariance = best.estimate.covariance
     assert covariance is not None
     deviations = np.sqrt(np.diagonal(covariance))
-    values = np.concatenate([np.asarray(v) for v in best.found.numbers.values()])
-    names = [f"`{n}` {i}" for n, v in best.found.numbers.items() for i in range(len(v))]
+    values = np.concatenate([np.asarray(v) for v in best.estimate.numbers.values()])
+    names = [f"`{n}` {i}" for n, v in best.estimate.numbers.items() for i in range(len(v))]
     rows = [(n, f"{v:.5g}", f"{d:.3g}") for n, v, d in zip(names, values, deviations, strict=True)]
     return tables.table(("number", "value", "standard deviation"), rows)
 
@@ -109,14 +109,14 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     given = parser.parse_args()
     searches: list[Search] = []
-    judged = refutation.judged
+    judged = refutation.judge
 
     def noted(search: Search, judge: refutation.Judge | None):
         searches.append(search)
         print(text(search))
         return judged(search, judge)
 
-    with patch.object(refutation, "judged", noted):
+    with patch.object(refutation, "judge", noted):
         diagnose_run(given.run, Store(given.store), given.voyages, given.out)
 
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from shiplog.diagnosis.hypotheses import evidence
 from shiplog.diagnosis.noise.remainder import Remainder
-from shiplog.diagnosis.trial.fitted import Fit, Found, Point, Start
+from shiplog.diagnosis.trial.fitted import Estimate, Fit, Point, Start
 from shiplog.diagnosis.trial.trial import Trial
 
 RELINEARISATIONS = 10  # of linearising again, at most
@@ -38,7 +38,7 @@ class _Iterate:
     """A point θ₀, the posterior there, and the length δ of the step to its mean [sd]."""
 
     point: Point
-    base: Found
+    base: Estimate
     step: float
 
     def rejected(self, before: _Iterate) -> bool:
@@ -58,7 +58,7 @@ class _Iterate:
         little = max(gained, 0.5 * self.step**2) < evidence.LITTLE_NATS
         return little or self.step * rho / (1.0 - rho) < LEFT
 
-    def at_point(self) -> Found:
+    def estimate_at_point(self) -> Estimate:
         """The fit with the point's own numbers, in the order of its covariance, without the gain
         ½ δ² that the step promises."""
         at_point = {name: self.point.numbers[name] for name in self.base.numbers}
@@ -78,7 +78,7 @@ def resume(
     if anew:
         starts.pop(key, None)
     fit = evaluate(trial, included, remainder, starts.get(key, start), lowest)
-    if fit.found.evidence != -math.inf:
+    if fit.estimate.evidence != -math.inf:
         starts[key] = fit.start
     return fit
 
@@ -109,7 +109,7 @@ def evaluate(
     steady = with_force  # whether the process noise has converged: a round then keeps it
     for _ in range(RELINEARISATIONS):
         try:
-            point = trial.at(numbers, near, noise_factor, remainder)
+            point = trial.linearise(numbers, near, noise_factor, remainder)
             base = _posterior(trial, point, included, remainder, lately, steady)
             if base.evidence < lowest:
                 if abs(math.log(base.noise_factor / noise_factor)) < STEADY:
@@ -145,11 +145,11 @@ def evaluate(
             return Fit(point, replace(base, name=name), remainder)
     if best is None:
         assert trial.first is not None
-        return Fit(trial.first, Found(name, -np.inf, 1.0, numbers), remainder)
-    return Fit(best.point, replace(best.at_point(), name=name), remainder)
+        return Fit(trial.first, Estimate(name, -np.inf, 1.0, numbers), remainder)
+    return Fit(best.point, replace(best.estimate_at_point(), name=name), remainder)
 
 
-def _length(point: Point, base: Found, included: Sequence[str]) -> float:
+def _length(point: Point, base: Estimate, included: Sequence[str]) -> float:
     """Of the step from a point's numbers to the most probable ones there, standard deviations."""
     if not included:
         return 0.0
@@ -161,7 +161,7 @@ def _length(point: Point, base: Found, included: Sequence[str]) -> float:
 def _posterior(
     trial: Trial, point: Point, included: Sequence[str], remainder: Remainder,
     lately: float | None, steady: bool,
-) -> Found:  # fmt: skip
+) -> Estimate:  # fmt: skip
     """The hypothesis at a point, over λ, or at the λ of the last round where that is steady.
     Raises np.linalg.LinAlgError where the path diverged."""
     if np.abs(point.linear.e).max() > AWAY:

@@ -16,7 +16,7 @@ from shiplog.diagnosis.linear.parameter_layout import HELD_INFORMATION
 from shiplog.diagnosis.noise import bounds
 from shiplog.diagnosis.noise.campaign_parts import robust_weights, squares
 from shiplog.diagnosis.noise.remainder import CHANGE_SIZES, Remainder, noise_prior
-from shiplog.diagnosis.trial.fitted import ExpectedEvidence, Found, Level, Point
+from shiplog.diagnosis.trial.fitted import Estimate, ExpectedEvidence, Level, Point
 from shiplog.diagnosis.trial.trial import Numbers, Trial
 from shiplog.models.causes import Cause
 
@@ -33,16 +33,16 @@ def begin(trial: Trial, numbers: Numbers) -> tuple[Trial, Point]:
     The path is limited by the process noise that was estimated about the path before, until the
     evidence stays: causes must not gain by a path that converges with them. Segments on which the
     model diverges carry no information. Raises np.linalg.LinAlgError where it diverges on all."""
-    first = trial.at(numbers)
-    trial = replace(trial.leaving_out(first.linear.lost), first=first)
+    first = trial.linearise(numbers)
+    trial = replace(trial.leave_out(first.linear.lost), first=first)
     trial = replace(trial, weight=robust(trial, first))
     point, last = first, -np.inf
     for _ in range(MOST_PATHS):
         base, _ = scan(trial, point, (), trial.fixed)
         if abs(base.evidence - last) < LITTLE_NATS:
             break
-        point, last = trial.at(numbers, point, base.noise_factor), base.evidence
-    trial = trial.leaving_out(point.linear.lost)
+        point, last = trial.linearise(numbers, point, base.noise_factor), base.evidence
+    trial = trial.leave_out(point.linear.lost)
     if not trial.weight.any():  # a prior without data would name nothing, as if nothing had changed
         raise np.linalg.LinAlgError("the model diverges on every segment of the trial")
     return replace(trial, begun=True), point
@@ -52,7 +52,7 @@ def robust(trial: Trial, point: Point) -> np.ndarray:
     """Weights [S] of the segments by their χ² at the posterior mean, A⁻¹ b (7). They are the same
     for every hypothesis: a few segments must not decide."""
     best = max(levels(trial, point), key=lambda one: one.value)
-    none = np.zeros(trial.unseen.count)
+    none = np.zeros(trial.omitted.count)
     unit = np.append(trial.reference.columns.unit, none)
     d = np.append(best.mean[: len(trial.reference.pull)], none)
     modes, noise = trial.products.modes(point, best.noise_factor, NO_CHANGE_OF_NOISE)
@@ -126,7 +126,7 @@ def _prior(
     are counted from the point, where they are θ₀; of a family's weights N(0, size² I). The model's
     own causes are held."""
     ref, unit = trial.reference, trial.reference.columns.unit
-    columns = [ref.columns.of[name] for name in included]
+    columns = [ref.columns.indices[name] for name in included]
     family = trial.families.get(remainder.kind, np.zeros(0, int))
     precisions = [
         np.full(len(of), HELD_INFORMATION if name in trial.fixed else 1.0)
@@ -153,7 +153,7 @@ def _prior(
 def _columns(trial: Trial, included: Sequence[str], remainder: Remainder) -> np.ndarray:
     """[N] columns of H among the trial's C: all nominal numbers, causes, a family's weights."""
     ref = trial.reference
-    causes = (ref.columns.of[name] for name in included)
+    causes = (ref.columns.indices[name] for name in included)
     family = trial.families.get(remainder.kind, np.zeros(0, int))
     return np.concatenate((np.arange(len(ref.pull)), *causes, family)).astype(int)
 
@@ -161,7 +161,7 @@ def _columns(trial: Trial, included: Sequence[str], remainder: Remainder) -> np.
 # --- more numbers, by a Schur complement
 
 
-def candidate(trial: Trial, one: Level, label: str) -> Found:
+def candidate(trial: Trial, one: Level, label: str) -> Estimate:
     """One cause x ~ N(0, I) in addition to a base hypothesis: (10) to (12) with σ = 1, and (13).
 
         log Bayes factor = ½ yᵀ (M + I)⁻¹ y - ½ log|M + I|,   x | r ~ N((M + I)⁻¹ y, (M + I)⁻¹)
@@ -169,7 +169,7 @@ def candidate(trial: Trial, one: Level, label: str) -> Found:
     To expect of x before any data are ½ |(M + I)^-½ M x|² - cost nats, with the cost
     ½ log|M + I| - ½ tr M (M + I)⁻¹.
     """
-    columns = trial.reference.columns.of[label]
+    columns = trial.reference.columns.indices[label]
     unit = trial.reference.columns.unit[columns]
     identity = np.eye(len(columns))
     B = one.G[1:, 1:][:, columns]
@@ -183,15 +183,15 @@ def candidate(trial: Trial, one: Level, label: str) -> Found:
     nats += bounds.log_share(x, _deviations(covariance), np.ones(len(unit)), low, high)
     farthest = trial.farthest(label) * unit[0] / unit[-1]
     if math.isfinite(farthest):
-        nats += bounds.log_on_board(x, covariance, np.ones(len(unit)), farthest)
-        x = bounds.on_board(x, covariance, farthest)
-    x = bounds.within(x, covariance, low, high)
+        nats += bounds.log_share_on_board(x, covariance, np.ones(len(unit)), farthest)
+        x = bounds.mode_on_board(x, covariance, farthest)
+    x = bounds.bounded_mode(x, covariance, low, high)
     M = M_and_I - identity
     M_shrunk = M @ covariance
     expected = ExpectedEvidence(
         np.diagonal(M_shrunk @ M).copy(), half_log - 0.5 * float(np.trace(M_shrunk))
     )
-    return Found(
+    return Estimate(
         label, one.value + nats, one.noise_factor, {label: x * unit},
         covariance * np.outer(unit, unit), expected,
     )  # fmt: skip
@@ -210,7 +210,7 @@ def family_change(
     """
     ref, c = trial.reference, trial.reference.counts
     W = 1 + trial.families[family]
-    H = 1 + np.concatenate([np.arange(len(ref.pull)), *(ref.columns.of[n] for n in included)])
+    H = 1 + np.concatenate([np.arange(len(ref.pull)), *(ref.columns.indices[n] for n in included)])
     G, _ = trial.products.total(
         point, one.noise_factor, trial.weight, replace(remainder, kind=family)
     )
@@ -242,8 +242,8 @@ def numbers_of(
     if np.isfinite(covariance).all():
         for name, at in zip(included, (0, *ends), strict=True):
             if math.isfinite(trial.farthest(name)):
-                mean = bounds.on_board(mean, covariance, trial.farthest(name), int(at))
-    mode = bounds.within(mean, covariance, low, high)
+                mean = bounds.mode_on_board(mean, covariance, trial.farthest(name), int(at))
+    mode = bounds.bounded_mode(mean, covariance, low, high)
     return dict(zip(included, np.split(mode, ends), strict=True)), covariance
 
 
@@ -255,7 +255,7 @@ def log_density(trial: Trial, one: Level, included: Sequence[str]) -> float:
     with Δ [Q] the step from the point to the posterior mean, and Σ [Q, Q] the covariance of the
     causes' numbers (7). The share of the bounds is left out."""
     columns, first = trial.reference.columns, len(trial.reference.pull)
-    own = slice(first, first + sum(len(columns.of[n]) for n in included))
+    own = slice(first, first + sum(len(columns.indices[n]) for n in included))
     step, sigma = one.mean[own], one.covariance[own, own]
     square = step @ np.linalg.solve(sigma, step)
     return one.value - one.share - 0.5 * float(square + np.linalg.slogdet(sigma)[1])
@@ -267,8 +267,8 @@ def _unbounded(
     """Posterior mean [Q] and covariance [Q, Q] of the included causes' numbers, SI (7)."""
     columns = trial.reference.columns
     none = np.zeros(0)
-    unit = np.concatenate([none, *(columns.unit[columns.of[name]] for name in included)])
-    at_point = [point.numbers.get(name, np.zeros(len(columns.of[name]))) for name in included]
+    unit = np.concatenate([none, *(columns.unit[columns.indices[name]] for name in included)])
+    at_point = [point.numbers.get(name, np.zeros(len(columns.indices[name]))) for name in included]
     first = len(trial.reference.pull)
     own = slice(first, first + len(unit))
     mean = np.concatenate([none, *at_point]) + one.mean[own] * unit
@@ -292,12 +292,12 @@ def _log_share_of_bounds(
     mean, covariance = _unbounded(trial, one, point, included)
     deviation = _deviations(covariance)
     for name in included:
-        size = columns.unit[columns.of[name]]
+        size = columns.unit[columns.indices[name]]
         own, at = slice(at, at + len(size)), at + len(size)
         if name not in trial.fixed:
             share += bounds.log_share(mean[own], deviation[own], size, *trial.bounds(name))
             if math.isfinite(trial.farthest(name)) and np.isfinite(deviation[own]).all():
-                share += bounds.log_on_board(
+                share += bounds.log_share_on_board(
                     mean[own], covariance[own, own], size, trial.farthest(name)
                 )
     return share
@@ -345,7 +345,7 @@ def levels(
 def scan(
     trial: Trial, point: Point, candidates: Sequence[Cause], included: Sequence[str] = (),
     near: float | None = None, remainder: Remainder = NO_CHANGE_OF_NOISE,
-) -> tuple[Found, list[Found]]:  # fmt: skip
+) -> tuple[Estimate, list[Estimate]]:  # fmt: skip
     """The base hypothesis at its most probable λ; and each candidate in addition to it, at its
     own, with its log Bayes factor as its evidence, the greatest first."""
     tried = levels(trial, point, included, near, remainder)
@@ -355,17 +355,17 @@ def scan(
         each = [candidate(trial, one, cause.label) for one in tried]
         found.append(max(each, key=lambda one: one.evidence))
     over_base = [replace(one, evidence=one.evidence - best.value) for one in found]
-    return _found(trial, best, point, included), sorted(over_base, key=lambda one: -one.evidence)
+    return _estimate(trial, best, point, included), sorted(over_base, key=lambda one: -one.evidence)
 
 
 def fit(
     trial: Trial, point: Point, included: Sequence[str], noise: float, remainder: Remainder
-) -> Found:
+) -> Estimate:
     """The base hypothesis at one factor λ = `noise` of the process noise."""
-    return _found(trial, level(trial, point, noise, included, remainder), point, included)
+    return _estimate(trial, level(trial, point, noise, included, remainder), point, included)
 
 
-def _found(trial: Trial, one: Level, point: Point, included: Sequence[str]) -> Found:
+def _estimate(trial: Trial, one: Level, point: Point, included: Sequence[str]) -> Estimate:
     numbers, covariance = numbers_of(trial, one, point, included)
     density = log_density(trial, one, included)
-    return Found("nothing", one.value, one.noise_factor, numbers, covariance, density=density)
+    return Estimate("nothing", one.value, one.noise_factor, numbers, covariance, density=density)

@@ -27,7 +27,7 @@ CHANNELS = tuple(c.name for c in channels.VELOCITY)
 def solution(trial: Trial, fit: Fit) -> Level:
     """Posterior of a hypothesis at its own λ (7)."""
     return evidence.level(
-        trial, fit.point, fit.found.noise_factor, fit.included, fit.remainder
+        trial, fit.point, fit.estimate.noise_factor, fit.included, fit.remainder
     )  # fmt: skip
 
 
@@ -52,8 +52,8 @@ def numbers_from_point(trial: Trial, fit: Fit) -> np.ndarray:
     ref = trial.reference
     level = solution(trial, fit)
     d = level.mean[: len(ref.columns.unit)] * ref.columns.unit
-    for name, values in fit.found.numbers.items():
-        d[ref.columns.of[name]] += values - fit.point.numbers.get(name, 0.0)
+    for name, values in fit.estimate.numbers.items():
+        d[ref.columns.indices[name]] += values - fit.point.numbers.get(name, 0.0)
     return d
 
 
@@ -68,8 +68,8 @@ def refitted(
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """Numbers of the causes and coefficients [P] from (7), with the products G of the segments that
     are not `left_out` [S] bool."""
-    noise = fit.found.noise_factor
-    G = trial.products.leaving_out(fit.point, noise, trial.weight, fit.remainder, left_out)
+    noise = fit.estimate.noise_factor
+    G = trial.products.leave_out(fit.point, noise, trial.weight, fit.remainder, left_out)
     level = evidence.solve(trial, G, 0.0, noise, fit.point, fit.included, fit.remainder)
     numbers, _ = evidence.numbers_of(trial, level, fit.point, fit.included)
     return numbers, _coefficients(trial, level)
@@ -90,7 +90,7 @@ def less_parts(trial: Trial, linear: Linear, fit: Fit) -> Linear:
     part = np.searchsorted(begins, linear.cut.rows, side="right") - 1
     b = np.zeros((len(linear.e), columns.linearised + accelerations.shape[-1]))
     each = trial.products.each_part(
-        fit.point, fit.found.noise_factor, trial.weight, fit.remainder
+        fit.point, fit.estimate.noise_factor, trial.weight, fit.remainder
     )  # fmt: skip
     for k, G in enumerate(each):
         b[part == k] = voyage_effects.own_numbers(G, theta, deviation) * columns.unit
@@ -112,9 +112,9 @@ def imitated(trial: Trial, fit: Fit, label: str, size: float) -> float:
     if family is None:
         return 0.0
     ref = trial.reference
-    of, nominal = ref.columns.of[label], np.arange(len(ref.pull))
+    of, nominal = ref.columns.indices[label], np.arange(len(ref.pull))
     G, _ = trial.products.total(
-        fit.point, fit.found.noise_factor, trial.weight, fit.remainder
+        fit.point, fit.estimate.noise_factor, trial.weight, fit.remainder
     )  # fmt: skip
     G = ref.counts * G[1:, 1:]
     both = np.concatenate((of, family)).astype(int)
@@ -122,7 +122,7 @@ def imitated(trial: Trial, fit: Fit, label: str, size: float) -> float:
     A = G[: len(nominal), : len(nominal)] + ref.information
     M = G[np.ix_(both, both)] - B.T @ np.linalg.solve(A, B)
     q = len(of)
-    x = fit.found.numbers[label] / ref.columns.unit[of]
+    x = fit.estimate.numbers[label] / ref.columns.unit[of]
     whole = x @ M[:q, :q] @ x
     g = M[q:, :q] @ x
     M_ww = M[q:, q:] + size**-2.0 * np.eye(len(family))
@@ -133,8 +133,8 @@ def acts_on(trial: Trial, fit: Fit, family: str) -> tuple[str, ...]:
     """Channels on which a change of a family's weights acts: where the standard deviation of its
     acceleration W w, over that of the process noise, is near the largest."""
     changed_by = replace(fit.remainder, kind=family, size=CHANGE_SIZES[1], noisy=False)
-    level = evidence.level(trial, fit.point, fit.found.noise_factor, fit.included, changed_by)
-    of = trial.unseen if family in discrepancy.UNSEEN else trial.campaign.discrepancy
+    level = evidence.level(trial, fit.point, fit.estimate.noise_factor, fit.included, changed_by)
+    of = trial.omitted if family in discrepancy.OMITTED else trial.campaign.discrepancy
     columns = trial.families[family]
     w = np.zeros(of.count)
     w[columns - of.families[0].columns[0]] = level.mean[-len(columns) :]

@@ -26,7 +26,7 @@ from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
 from shiplog.diagnosis.linear.linear_segments import Path
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
-from shiplog.diagnosis.trial.fitted import Found, Point
+from shiplog.diagnosis.trial.fitted import Estimate, Point
 from shiplog.models.causes import Cause
 
 Key = tuple[tuple[str, ...], str]  # causes by label, in alphabetical order, and kind of remainder
@@ -49,7 +49,7 @@ class Hypothesis:
                a constant
     point      the trial linearised at the causes' numbers; of a hypothesis far behind, the point
                without relinearisation
-    found      their numbers and covariance there
+    estimate   their numbers and covariance there
     side_force  of an intermittent remainder
     """
 
@@ -58,7 +58,7 @@ class Hypothesis:
     evidence: float
     score: float
     point: Point | Place
-    found: Found
+    estimate: Estimate
     side_force: SideForce | None = None
 
     @property
@@ -68,7 +68,7 @@ class Hypothesis:
     @property
     def noise_factor(self) -> float:
         """As `Fit.noise_factor`."""
-        return self.remainder.overall(self.found.noise_factor)
+        return self.remainder.overall(self.estimate.noise_factor)
 
 
 def name_of(label: str) -> str:

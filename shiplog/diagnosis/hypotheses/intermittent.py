@@ -25,7 +25,7 @@ from shiplog.diagnosis.linear.segments import SegmentGrid
 from shiplog.diagnosis.noise import likelihood, on_off, raised_noise
 from shiplog.diagnosis.noise.likelihood import ProcessNoise
 from shiplog.diagnosis.noise.on_off import ON, STRONGEST
-from shiplog.diagnosis.noise.raised_noise import Left
+from shiplog.diagnosis.noise.raised_noise import Residual
 from shiplog.diagnosis.noise.remainder import Remainder
 from shiplog.diagnosis.nominal.nominal_campaign import Campaign
 from shiplog.diagnosis.trial.fitted import Fit
@@ -59,7 +59,7 @@ class ResidualNoise:
 
     def raised(self, fit: Fit) -> Remainder:
         """Process noise raised in each channel by itself."""
-        return raised_noise.by_channel(noise_left(self.trial, fit), self.nominal)[1]
+        return raised_noise.raise_channels(noise_left(self.trial, fit), self.nominal)[1]
 
     def side_force(self, fit: Fit) -> SideForce:
         """As `side_force`, with its log Bayes factor over raised noise, whose nominal part acts at
@@ -92,7 +92,7 @@ def nominal_side_force(campaign: Campaign, g: SegmentGrid) -> Remainder | None:
         G = c * part[: 1 + len(P_inv_mu), : 1 + len(P_inv_mu)]
         d[rows] = np.linalg.solve(G[1:, 1:] + P_inv, G[1:, 0] + P_inv_mu) * unit
     left, none = linear.less_numbers(d, accelerations), np.zeros(linear.j.shape[-1])
-    kept = raised_noise.left_by(
+    kept = raised_noise.residual(
         left, none, reference.process_noise, campaign.weight, reference.counts
     )
     found = unrecorded_thruster.estimate_side_force(kept, reference)
@@ -104,7 +104,7 @@ def side_force(trial: Trial, fit: Fit, at_one_place: Remainder | None = None) ->
 
     It is on or off where its pattern may be that of a device, and such a course is more probable:
     that of this estimate, or the one that the hypothesis has. `at_one_place` as
-    `raised_noise.by_channel` has it."""
+    `raised_noise.raise_channels` has it."""
     left = noise_left(trial, fit)
     found = unrecorded_thruster.estimate_side_force(left, trial.reference, at_one_place)
     if found.gain <= 0.0:
@@ -124,11 +124,11 @@ def side_force(trial: Trial, fit: Fit, at_one_place: Remainder | None = None) ->
     return max((found, *devices), key=lambda one: one.value)
 
 
-def noise_left(trial: Trial, fit: Fit) -> Left:
+def noise_left(trial: Trial, fit: Fit) -> Residual:
     """The residual r - W w - J d of a hypothesis, to be explained by noise."""
     left, d = fits.residual(trial, fit.point.linear, fit)
     ref = trial.reference
-    return raised_noise.left_by(left, d, ref.process_noise, trial.weight, ref.counts)
+    return raised_noise.residual(left, d, ref.process_noise, trial.weight, ref.counts)
 
 
 def add_pattern(trial: Trial, fit: Fit, side_force: SideForce) -> SideForce:
@@ -146,7 +146,7 @@ def force_at_nodes(
 
     It is that of a hypothesis whose remainder has it, or in the given process noise that has it."""
     if process_noise is None:
-        process_noise = trial.process_noise(fit.remainder).times(fit.found.noise_factor)
+        process_noise = trial.process_noise(fit.remainder).times(fit.estimate.noise_factor)
     left = fits.residual(trial, fit.point.linear, fit)
     z, covariance = likelihood.starts_and_accelerations(*left, process_noise)
     a, V, J = z[:, 6:, None], covariance[:, 6:, 6:], trial.grid.nodes

@@ -169,7 +169,7 @@ class Search:
         table, nothing = self.table, self.table.nothing
         _, found = evidence.scan(
             table.trial, table.fit(nothing).point, table.catalogue, table.trial.fixed,
-            nothing.found.noise_factor,
+            nothing.estimate.noise_factor,
         )  # fmt: skip
         scale = table.scale
         table.alone |= {f.name: f.evidence for f in found}
@@ -182,7 +182,7 @@ class Search:
     def _say_what_would_not_show(self) -> None:
         """Log the causes that these voyages cannot reveal, before any is searched for."""
         shares = {
-            name: expected.together(thresholds.SHOWS_NATS)
+            name: expected.common_size(thresholds.SHOWS_NATS)
             for name, expected in self.expected.items()
         }
         blind = [f"{name_of(n)} below {s:.0%}" for n, s in shares.items() if s > 1.0]
@@ -202,14 +202,14 @@ def additions(
     ]  # fmt: skip
     _, found = evidence.scan(
         table.trial, fit.point, candidates, (*table.trial.fixed, *one.causes),
-        one.found.noise_factor, one.remainder,
+        one.estimate.noise_factor, one.remainder,
     )  # fmt: skip
     scale, added = table.scale, []
     for f in found:
         if f.evidence <= 0.0 or f.evidence < LIKELY * found[0].evidence:
             continue
         labels = tuple(sorted((*one.causes, f.name)))
-        numbers = {**one.found.numbers, **f.numbers}
+        numbers = {**one.estimate.numbers, **f.numbers}
         added.append((labels, numbers, scale.score(one.evidence + f.evidence, labels, one.kind)))
     return added[:CONTENDERS]
 
@@ -217,7 +217,7 @@ def additions(
 def reductions(one: Hypothesis) -> list[tuple[tuple[str, ...], dict[str, np.ndarray]]]:
     """The sets with one cause less than a hypothesis: labels, numbers to start from."""
     fewer = (tuple(n for n in one.causes if n != label) for label in one.causes)
-    return [(labels, {n: one.found.numbers[n] for n in labels}) for labels in fewer if labels]
+    return [(labels, {n: one.estimate.numbers[n] for n in labels}) for labels in fewer if labels]
 
 
 def _compatible(one: Cause, other: Cause) -> bool:

@@ -77,7 +77,7 @@ class Scale:
     ) -> Hypothesis:
         """A fit of these causes with its score."""
         score = self.score(evidence, labels, fit.remainder.kind)
-        return Hypothesis(labels, fit.remainder, evidence, score, fit.point, fit.found, force)
+        return Hypothesis(labels, fit.remainder, evidence, score, fit.point, fit.estimate, force)
 
 
 @dataclass
@@ -137,8 +137,8 @@ class Hypotheses:
         """A hypothesis with the trial linearised where it was."""
         point = one.point
         if isinstance(point, Place):
-            point = self.trial.at(point.numbers, point.path)
-        return Fit(point, one.found, one.remainder)
+            point = self.trial.linearise(point.numbers, point.path)
+        return Fit(point, one.estimate, one.remainder)
 
 
 def rescored(table: Table, scale: Scale) -> Table:

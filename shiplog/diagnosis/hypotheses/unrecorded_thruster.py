@@ -27,7 +27,7 @@ from scipy.optimize import minimize
 
 from shiplog.diagnosis.noise import on_off
 from shiplog.diagnosis.noise.on_off import Course
-from shiplog.diagnosis.noise.raised_noise import Left, by_channel
+from shiplog.diagnosis.noise.raised_noise import Residual, raise_channels
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, Remainder
 from shiplog.diagnosis.nominal.nominal_reference import Reference
 from shiplog.machine.jit_cache import traced
@@ -115,12 +115,12 @@ def extrapolated(last: Step, this: Step) -> SideForce:
 
 
 def estimate_side_force(
-    left: Left, ref: Reference, at_one_place: Remainder | None = None
+    left: Residual, ref: Reference, at_one_place: Remainder | None = None
 ) -> SideForce:
     """The most probable intermittent side force at one place along the ship, from the residual.
     It accelerates sway and yaw together, as no other process noise does. `at_one_place` as
-    `raised_noise.by_channel` has it."""
-    raised, _ = by_channel(left, at_one_place)
+    `raised_noise.raise_channels` has it."""
+    raised, _ = raise_channels(left, at_one_place)
     likelihood = _Likelihood(left, ref)
     sizes = left.nominal.acceleration[1] / abs(likelihood.across[1]) * SIZES  # N
     lever, force = max(itertools.product(LEVERS, sizes), key=lambda tried: likelihood.log(*tried))
@@ -128,7 +128,7 @@ def estimate_side_force(
 
 
 def estimate_on_off_force(
-    left: Left, ref: Reference, stationary: SideForce, course: Course, rows: np.ndarray
+    left: Residual, ref: Reference, stationary: SideForce, course: Course, rows: np.ndarray
 ) -> SideForce:
     """The most probable force of a device with this course, from one that may act at any time.
 
@@ -149,7 +149,7 @@ class _Likelihood:
     """Of a side force, by its lever in ship lengths, size [N] and correlation time over the usual
     one."""
 
-    def __init__(self, left: Left, ref: Reference) -> None:
+    def __init__(self, left: Residual, ref: Reference) -> None:
         self._left, self.length = left, ref.setting.scale["length"]
         self.across, self._turning = accelerations(  # of 1 N, of 1 N m
             ref.model.stand_in, ref.coefficients, np.eye(3)[1:]

@@ -25,7 +25,7 @@ from shiplog.diagnosis.hypotheses.intermittent import ResidualNoise
 from shiplog.diagnosis.hypotheses.table import Scale
 from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
 from shiplog.diagnosis.noise.remainder import NOMINAL, RAISED, Remainder, noise_prior
-from shiplog.diagnosis.trial.fitted import Fit, Found, Level, Point, Start
+from shiplog.diagnosis.trial.fitted import Estimate, Fit, Level, Point, Start
 from shiplog.diagnosis.trial.trial import Trial
 
 SEARCH_NATS = 10.0  # nats behind the best, beyond which a hypothesis is not worth a linearisation
@@ -69,12 +69,12 @@ class CauseSet:
 
     def fit(self, fit: Fit, remainder: Remainder, anew: bool = False) -> Fit:
         """These causes with another remainder, from the numbers and path of a fit."""
-        start = Start(fit.found.numbers, fit.point.path)
+        start = Start(fit.estimate.numbers, fit.point.path)
         return resume(self.trial, self.included, remainder, start, anew=anew)
 
     def hypothesis(self, fit: Fit, force: SideForce | None = None) -> Hypothesis:
         """A fit of them with its score."""
-        return self.scale.hypothesis(self.labels, fit.found.evidence, fit, force)
+        return self.scale.hypothesis(self.labels, fit.estimate.evidence, fit, force)
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ class Rough:
     def fit(self, level: Level, remainder: Remainder | None = None) -> Fit:
         """The set at one of its levels, under this remainder or another one of the same noise."""
         numbers = evidence.numbers_of(self.of.trial, level, self.point, self.of.included)
-        found = Found("+".join(self.of.labels), level.value, level.noise_factor, *numbers)
+        found = Estimate("+".join(self.of.labels), level.value, level.noise_factor, *numbers)
         return Fit(self.point, found, remainder or self.remainder)
 
 
@@ -149,10 +149,10 @@ def weigh(of: CauseSet, numbers: Mapping[str, np.ndarray], at: Point) -> list[Hy
     raised = of.hypothesis(rough.fit(rough.best))
     weighed = [nominal, raised]
     if plain.raises:
-        force = _with_force(of, raised)
+        force = _add_force(of, raised)
         weighed += [force] if force is not None else []
     alone = max(weighed, key=lambda h: h.score)
-    return [*weighed, *_with_families(of, plain, rough, alone)]
+    return [*weighed, *_add_families(of, plain, rough, alone)]
 
 
 def _plain(of: CauseSet, numbers: Mapping[str, np.ndarray], at: Point) -> Rough | None:
@@ -165,7 +165,7 @@ def _plain(of: CauseSet, numbers: Mapping[str, np.ndarray], at: Point) -> Rough 
         fit = resume(trial, included, RAISING, start, of.nothing - FAILED_NATS)
         if fit.diverged:
             return None
-        point, near = fit.point, fit.found.noise_factor
+        point, near = fit.point, fit.estimate.noise_factor
     levels = evidence.levels(trial, point, included, near, RAISING)
     if near is not None and near > RAISED_FROM:  # the noise may be nominal again
         levels.append(evidence.level(trial, point, 1.0, included, RAISING))
@@ -182,11 +182,11 @@ def weigh_as(
     its own; None where they are not more probable with it than `before`."""
     if not one.remainder.shaped:
         return None
-    numbers = {name: fit.found.numbers[name] for name in of.included}
-    start = replace(fit, found=replace(fit.found, numbers=numbers))
+    numbers = {name: fit.estimate.numbers[name] for name in of.included}
+    start = replace(fit, estimate=replace(fit.estimate, numbers=numbers))
     again = of.fit(start, one.remainder, anew=True)
     least = -math.inf if before is None else before.evidence + evidence.LITTLE_NATS
-    if again.diverged or again.found.evidence < least:
+    if again.diverged or again.estimate.evidence < least:
         return None
     force = one.side_force
     return of.hypothesis(again, None if force is None else of.noise.add_pattern(again, force))
@@ -202,7 +202,7 @@ def shape(plain: Rough) -> Rough:
     before, rounds = of.raised, NOISE_ROUNDS
     if before is not None and before.remainder.shaped:
         fit = of.fit(fit, before.remainder)
-        score = of.scale.score(fit.found.evidence, of.labels, RAISED)
+        score = of.scale.score(fit.estimate.evidence, of.labels, RAISED)
         rounds = 1 if score > before.score - SEARCH_NATS else 0
     for _ in range(rounds):
         if not fit.diverged:
@@ -210,7 +210,7 @@ def shape(plain: Rough) -> Rough:
     if fit.diverged:
         return plain
     levels = evidence.levels(
-        of.trial, fit.point, of.included, fit.found.noise_factor, fit.remainder
+        of.trial, fit.point, of.included, fit.estimate.noise_factor, fit.remainder
     )  # fmt: skip
     shaped = Rough(of, fit.point, fit.remainder, levels)
     return shaped if shaped.best.value > plain.best.value else plain
@@ -278,7 +278,7 @@ def change(plain: Rough, rough: Rough, family: str) -> Change:
     return Change(rough.point, remainder, value, noise)
 
 
-def _with_families(
+def _add_families(
     of: CauseSet, plain: Rough, rough: Rough, alone: Hypothesis
 ) -> Iterator[Hypothesis]:  # fmt: skip
     """The set together with a change of each family; `alone` is its best hypothesis without."""
@@ -286,19 +286,19 @@ def _with_families(
     scores = [of.scale.score(c.value, of.labels, c.remainder.kind) for c in changes]
     near = max((alone.score, *(score - SEARCH_NATS for score in scores)))
     for one, score in zip(changes, scores, strict=True):
-        yield _with_change(of, one, alone, score >= near)
+        yield _add_change(of, one, alone, score >= near)
 
 
-def _with_change(of: CauseSet, one: Change, alone: Hypothesis, leads: bool) -> Hypothesis:
+def _add_change(of: CauseSet, one: Change, alone: Hypothesis, leads: bool) -> Hypothesis:
     """The set together with a change of one family; linearised again if that is promising."""
     if not leads:  # far behind: its numbers are never asked for
-        found = replace(alone.found, evidence=one.value)
+        found = replace(alone.estimate, evidence=one.value)
         return of.hypothesis(Fit(one.point, found, one.remainder))
     here, _ = evidence.scan(of.trial, one.point, (), of.included, one.noise, one.remainder)
     there = Fit(one.point, here, one.remainder)
     if of.labels:
         again = of.fit(there, one.remainder)
-        if not again.diverged and again.found.evidence > one.value:
+        if not again.diverged and again.estimate.evidence > one.value:
             return of.hypothesis(again)
     return of.scale.hypothesis(of.labels, max(one.value, here.evidence), there)
 
@@ -306,7 +306,7 @@ def _with_change(of: CauseSet, one: Change, alone: Hypothesis, leads: bool) -> H
 # --- an intermittent force
 
 
-def _with_force(of: CauseSet, raised: Hypothesis) -> Hypothesis | None:
+def _add_force(of: CauseSet, raised: Hypothesis) -> Hypothesis | None:
     """An intermittent side force instead of raised process noise, with the causes fitted together
     with it: fitted to raised noise alone they would make up for it. Less probable than noise that
     is raised in each channel by itself it is that noise, and is not counted twice. Nor is a set
@@ -317,7 +317,7 @@ def _with_force(of: CauseSet, raised: Hypothesis) -> Hypothesis | None:
     if found is None:
         return None
     fit, force = found
-    if force.gain <= 0.0 or fit.found.evidence <= raised.evidence:
+    if force.gain <= 0.0 or fit.estimate.evidence <= raised.evidence:
         return None
     return of.hypothesis(fit, of.noise.add_pattern(fit, force))
 
@@ -327,7 +327,7 @@ def _fitted_with_force(of: CauseSet, raised: Hypothesis) -> tuple[Fit, SideForce
     begin with the most probable force so far, or with raised noise. Its gain is that of the last
     estimate next to these numbers. None where the fit diverges."""
     assert isinstance(raised.point, Point)
-    fit = Fit(raised.point, raised.found, raised.remainder)
+    fit = Fit(raised.point, raised.estimate, raised.remainder)
     given = None if of.intermittent is None else of.intermittent.side_force
     best: tuple[Fit, SideForce] | None = None
     if given is not None:
@@ -343,13 +343,15 @@ def _fitted_with_force(of: CauseSet, raised: Hypothesis) -> tuple[Fit, SideForce
         steps = [] if given is None else [*steps[-1:], (given, tried)]
         given = tried if len(steps) < 2 else unrecorded_thruster.extrapolated(*steps)
         last, fit = fit, of.fit(fit, given.remainder)
-        if given is not tried and fit.found.evidence < last.found.evidence:  # they led too far
+        if (
+            given is not tried and fit.estimate.evidence < last.estimate.evidence
+        ):  # they led too far
             given, steps = tried, []
             fit = of.fit(last, given.remainder)
-        reached = -math.inf if best is None else best[0].found.evidence
-        if fit.diverged or fit.found.evidence <= reached:
+        reached = -math.inf if best is None else best[0].estimate.evidence
+        if fit.diverged or fit.estimate.evidence <= reached:
             break
         best = fit, given
-        if fit.found.evidence < max(reached + FORCE_NATS, raised.evidence - LEFT_NATS):
+        if fit.estimate.evidence < max(reached + FORCE_NATS, raised.evidence - LEFT_NATS):
             break
     return None if best is None else (best[0], replace(best[1], gain=gain))

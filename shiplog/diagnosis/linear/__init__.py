@@ -8,7 +8,7 @@ A segment s has B observations y_b, means over bins of the state x = (x₀, u, y
 
 with an acceleration that the model has not: aⱼ [3] at node j, hⱼ the hat functions of J nodes, so
 that it is straight in between. A path x* starts at ξ* and has accelerations a*: both are fitted
-to the measurement (`linearisation.pulled`), as a path from a measured state alone soon leaves it.
+to the measurement (`linearisation.fit_path`), as a path from a measured state alone soon leaves it.
 About that path and θ*, with the simulated means y*, what is simulated and what is read are linear:
 
     y_s + O_s (θ - θ*) = y_s* + H_s (θ - θ*) + Z_s (z_s - z_s*) + ε_s

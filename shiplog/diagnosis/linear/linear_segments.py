@@ -17,12 +17,12 @@ class Path:
     start: np.ndarray
     acceleration: np.ndarray
 
-    def at_instants(self, g: SegmentGrid) -> np.ndarray:
+    def interpolate(self, g: SegmentGrid) -> np.ndarray:
         """Σⱼ hⱼ(tₖ) aⱼ*: the acceleration at the K instants of the steps [S, K, 3]."""
         return np.einsum("scj,kj->skc", self.acceleration, g.weights)
 
     @property
-    def known(self) -> np.ndarray:
+    def coordinates(self) -> np.ndarray:
         """z* = (0, a*) [S, 6 + 3J]: the start counts from ξ*, the acceleration from zero."""
         return np.concatenate(
             (np.zeros_like(self.start), self.acceleration.reshape(len(self.acceleration), -1)), 1

@@ -59,7 +59,7 @@ def stable_steps(model: Smooth, step: float) -> int:
     return max(1, math.ceil(2.0 * model.substeps * step - 1e-9))
 
 
-def _between(values: np.ndarray, many: int) -> np.ndarray:
+def _interpolate(values: np.ndarray, many: int) -> np.ndarray:
     """v(k + i/m) = vₖ + i/m (vₖ₊₁ - vₖ), i < m: of values [S, K, ...] those at m = `many` instants
     for one, [S, (K - 1) m + 1, ...]."""
     if many == 1:
@@ -166,7 +166,7 @@ def resampled(at: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndar
     return left + part[:, None] * (values[:, right] - left)
 
 
-def pulled(
+def fit_path(
     model: Smooth,
     theta: np.ndarray,
     segments: Cut,
@@ -195,11 +195,13 @@ def pulled(
     return path
 
 
-def ahead(linear: Linear, d: np.ndarray, wide: Wide, about: np.ndarray | None = None) -> Path:
-    """Where a linearisation expects `pulled` to end once θ has moved by d [C]: one step of
+def predict_path(
+    linear: Linear, d: np.ndarray, wide: Wide, about: np.ndarray | None = None
+) -> Path:
+    """Where a linearisation expects `fit_path` to end once θ has moved by d [C]: one step of
     Gauss-Newton from the gap y - y* - J d = e - J d - Z z*. Nothing is simulated; what is not
-    linear shows when the model is linearised there. `about` as in `pulled`."""
-    gap = linear.e - linear.j @ d - np.einsum("sbcz,sz->sbc", linear.z, linear.path.known)
+    linear shows when the model is linearised there. `about` as in `fit_path`."""
+    gap = linear.e - linear.j @ d - np.einsum("sbcz,sz->sbc", linear.z, linear.path.coordinates)
     return _closer(linear.path, gap, linear.z, linear.cut.used, wide, about)[0]
 
 
@@ -228,7 +230,7 @@ def _closer(
     weight = np.where(used, 1.0 / wide.noise, 0.0)
     Z = (z * weight[..., None]).reshape(count, -1, size)  # R^-½ Z
     # the start is free about where it stands, the nodes about what is expected of them
-    off = path.known
+    off = path.coordinates
     if about is not None:
         off[:, 6:] -= about
     Zt = np.swapaxes(Z, 1, 2)
@@ -271,7 +273,7 @@ def linear(
     read = moved.shape[-1]
     z, j = columns[..., :size].copy(), columns[..., size:].copy()
     j[..., len(theta) - read :] -= observed
-    e = segments.y - y + np.einsum("sbcz,sz->sbc", z, path.known)
+    e = segments.y - y + np.einsum("sbcz,sz->sbc", z, path.coordinates)
     e[lost] = 0.0  # columns of zeros times a path that is not finite are not zero
     return Linear(segments, path, e, z, j, lost)
 
@@ -307,7 +309,7 @@ def chunks(count: int) -> Iterator[tuple[slice, Callable[[np.ndarray], np.ndarra
         yield part, filled
 
 
-def _along(model, theta, states, driven, step, *, coefficients) -> list[np.ndarray]:
+def _instant_slopes(model, theta, states, driven, step, *, coefficients) -> list[np.ndarray]:
     """∂f/∂x, ∂f/∂u, ∂f/∂θ (`_slopes`) at every instant of a step, by segments [S, K, 3, 6 or D or
     P; P only where `coefficients` are asked for]. Those of a model that is smooth and takes long (a
     network) are worked out as often as they change, and go straight between:
@@ -341,22 +343,29 @@ def _every(model, theta, segments, path, g, moved):
     """`simulated`, chunk by chunk: y_b = (1/T) ∫ x dt over each bin of T s, by the trapezium."""
     many = stable_steps(model, segments.step)
     step = segments.step / many
-    acceleration, hats = path.at_instants(g), _between(g.weights[None], many)[0]
+    acceleration, hats = path.interpolate(g), _interpolate(g.weights[None], many)[0]
     per = many * (g.instants - 1) // g.bins
     ys, columns = [], []
     for part, filled in chunks(len(segments)):
-        driven = _between(filled(segments.driven), many)
+        driven = _interpolate(filled(segments.driven), many)
         states = np.asarray(
             states_along(
-                model, theta, filled(path.start), _between(filled(acceleration), many), driven, step
+                model,
+                theta,
+                filled(path.start),
+                _interpolate(filled(acceleration), many),
+                driven,
+                step,
             )
         )
         keep = slice(part.stop - part.start)
-        by_state, by_driven, by_theta = _along(
+        by_state, by_driven, by_theta = _instant_slopes(
             model, theta, states, driven, step, coefficients=moved is not None
         )
         states = states[keep]
-        how = np.zeros((*driven[keep].shape, 0)) if moved is None else _between(moved[part], many)
+        how = (
+            np.zeros((*driven[keep].shape, 0)) if moved is None else _interpolate(moved[part], many)
+        )
         pairs = 0.5 * (states[:, 1:] + states[:, :-1])
         ys.append(pairs.reshape(len(states), g.bins, per, 6).mean(2))
         columns.append(

@@ -94,7 +94,7 @@ def read(
         if cause.shifts and of is not before:
             averaged, of = before.smoothed(AVERAGING_S), before
         moving = averaged if cause.shifts else before
-        for i, column in enumerate(columns.of[cause.label]):
+        for i, column in enumerate(columns.indices[cause.label]):
             step = np.zeros(cause.count)
             step[i] = READ_STEP * sizes[cause.label][i]
             # not beyond what it may be: a lag that is negative sharpens steps and noise
@@ -105,10 +105,10 @@ def read(
             )
             # of what both share nothing changes
             if more.actuator is not less.actuator:
-                change = segments.at_instants(record, rows, more.actuator - less.actuator)
+                change = segments.average_at_instants(record, rows, more.actuator - less.actuator)
                 moved[..., : change.shape[-1], column] = change / apart
             if more.wind is not less.wind or more.state is not less.state:
-                change = segments.at_instants(record, rows, more.true_wind - less.true_wind)
+                change = segments.average_at_instants(record, rows, more.true_wind - less.true_wind)
                 moved[..., -2:, column] = change / apart
             if more.state is not less.state:
                 between = replace(more, state=more.state - less.state)

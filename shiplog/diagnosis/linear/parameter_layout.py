@@ -40,7 +40,7 @@ class Columns:
         return len(self.unit) - self.misfit
 
     @cached_property
-    def of(self) -> dict[str, np.ndarray]:
+    def indices(self) -> dict[str, np.ndarray]:
         """Cause's label → its columns."""
         found, at = {}, self.base
         for cause in self.causes:
@@ -49,19 +49,19 @@ class Columns:
         return found
 
     @cached_property
-    def known(self) -> np.ndarray:
+    def prior_information(self) -> np.ndarray:
         """K [C], the diagonal of the prior information on x: 1, a standard deviation of one unit;
         HELD_INFORMATION of a cause that has no nominal size of its own, as it is an alias of
         coefficients or of another cause."""
         whole = np.ones(len(self.unit))
         for cause in self.causes:
             if not cause.nominal:
-                whole[self.of[cause.label]] = HELD_INFORMATION
+                whole[self.indices[cause.label]] = HELD_INFORMATION
         return whole
 
     def numbers(self, given: Mapping[str, np.ndarray]) -> np.ndarray:
         """q of all causes, SI, from those of some (label → q); zero for the others."""
         whole = np.zeros(self.linearised)
         for label, values in given.items():
-            whole[self.of[label]] = values
+            whole[self.indices[label]] = values
         return whole[self.base :]

@@ -50,7 +50,7 @@ def rows_of_nodes(begins: np.ndarray, g: SegmentGrid) -> np.ndarray:
     return begins[:, None] + round(g.node_step / g.step) * np.arange(g.nodes)
 
 
-def in_each_channel(waves: np.ndarray) -> np.ndarray:
+def repeat_for_channels(waves: np.ndarray) -> np.ndarray:
     """I₃ ⊗ φᵀ at each node, [S, J, F] → [S, J, 3, 3F]: F features in each channel alone."""
     count = waves.shape[-1]
     out = np.zeros((*waves.shape[:2], 3, 3 * count))

@@ -107,7 +107,7 @@ def cut(record: Record, rows: np.ndarray) -> Cut:
 def measured(record: Record, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """State [S, B, 6], averaged over bins, and whether most of a bin was measured."""
     g = grid(record)
-    whole, ends, per = _in_bins(record.measured[:, None].astype(float), rows, g)
+    whole, ends, per = _bin_sums(record.measured[:, None].astype(float), rows, g)
     measured = whole + ends[:, 1:] > 0.5 * (per + 1)
     return means_of_bins(record, rows), np.repeat(measured, 6, axis=-1)
 
@@ -115,11 +115,11 @@ def measured(record: Record, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def means_of_bins(record: Record, rows: np.ndarray) -> np.ndarray:
     """y_b = (½ x₀ + x₁ + … + x_{n-1} + ½ xₙ) / n: means of the state over bins [S, B, 6], by the
     trapezium over the n rows that a bin goes on for."""
-    whole, ends, per = _in_bins(record.state, rows, grid(record))
+    whole, ends, per = _bin_sums(record.state, rows, grid(record))
     return (whole + 0.5 * (ends[:, 1:] - ends[:, :-1])) / per
 
 
-def _in_bins(
+def _bin_sums(
     values: np.ndarray, rows: np.ndarray, g: SegmentGrid
 ) -> tuple[np.ndarray, np.ndarray, int]:
     """Of a record's rows [n, c]: sums [S, B, c] of each bin without its last row, the rows
@@ -133,10 +133,10 @@ def _in_bins(
 def driving(record: Record, rows: np.ndarray) -> np.ndarray:
     """Actuators, share of the campaign and true wind at the steps' instants [S, K, A + 3]."""
     driven = np.concatenate((record.actuator, record.share[:, None], record.true_wind), 1)
-    return at_instants(record, rows, driven)
+    return average_at_instants(record, rows, driven)
 
 
-def at_instants(record: Record, rows: np.ndarray, values: np.ndarray) -> np.ndarray:
+def average_at_instants(record: Record, rows: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Of a record's rows [n, c] those at the steps' instants [S, K, c], each the mean, by the
     trapezium, of the rows about it: what lies between two instants counts."""
     g = grid(record)

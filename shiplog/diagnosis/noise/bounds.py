@@ -15,7 +15,7 @@ NODES = 2000  # of that integral: about a hundredth of a standard deviation apar
 NEARLY_KNOWN = 1e-12  # of a variance, below which rounding may have left it
 
 
-def within(
+def bounded_mode(
     mean: np.ndarray, covariance: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> np.ndarray:
     """argmin (x - m)ᵀ Σ⁻¹ (x - m) over low ≤ x ≤ high [Q]: a Gaussian's most probable numbers
@@ -45,11 +45,13 @@ def log_share(
     mean, deviation  mᵢ and Σᵢᵢ^½ of the posterior without bounds
     size             sᵢ, standard deviation of the prior, about zero
     """
-    after = _log_within((low - mean) / deviation, (high - mean) / deviation)
-    return float((after - _log_within(low / size, high / size)).sum())
+    after = _log_probability((low - mean) / deviation, (high - mean) / deviation)
+    return float((after - _log_probability(low / size, high / size)).sum())
 
 
-def on_board(mean: np.ndarray, covariance: np.ndarray, farthest: float, at: int = 0) -> np.ndarray:
+def mode_on_board(
+    mean: np.ndarray, covariance: np.ndarray, farthest: float, at: int = 0
+) -> np.ndarray:
     """argmin (x - m)ᵀ Σ⁻¹ (x - m) over |xᵢ₊₁| ≤ k |xᵢ| [Q]: the most probable numbers of which the
     one after i = `at` is at most k = `farthest` times that one, either way; those that are, stay.
 
@@ -68,7 +70,7 @@ def on_board(mean: np.ndarray, covariance: np.ndarray, farthest: float, at: int 
     return np.array(min(edges)[1])
 
 
-def log_on_board(
+def log_share_on_board(
     mean: np.ndarray, covariance: np.ndarray, size: np.ndarray, farthest: float
 ) -> float:
     """log P(|x₂| ≤ k |x₁| | data) - log P(|x₂| ≤ k |x₁|), nats: what this bound adds to the log
@@ -77,12 +79,12 @@ def log_on_board(
     mean, covariance  m [2], Σ [2, 2] of the posterior without this bound
     size              s [2], standard deviations of the prior, about zero
     """
-    return _log_on_board(mean, covariance, farthest) - _log_on_board(
+    return _log_probability_on_board(mean, covariance, farthest) - _log_probability_on_board(
         np.zeros(2), np.diag(size**2), farthest
     )
 
 
-def _log_on_board(mean: np.ndarray, covariance: np.ndarray, farthest: float) -> float:
+def _log_probability_on_board(mean: np.ndarray, covariance: np.ndarray, farthest: float) -> float:
     """log ∫ N(x₁; m₁, Σ₁₁) P(|x₂| ≤ k |x₁| | x₁) dx₁, by a sum over NODES points within REACH
     standard deviations; x₂ | x₁ ~ N(m₂ + β (x₁ - m₁), Σ₂₂ - β Σ₁₂), β = Σ₁₂/Σ₁₁."""
     deviation = float(np.sqrt(covariance[0, 0]))
@@ -92,12 +94,12 @@ def _log_on_board(mean: np.ndarray, covariance: np.ndarray, farthest: float) -> 
     rest = np.sqrt(max(left, NEARLY_KNOWN * covariance[1, 1]))
     middle, most = mean[1] + slope * (first - mean[0]), farthest * np.abs(first)
     with np.errstate(divide="ignore"):  # nothing is between a bound and itself
-        inside = _log_within((-most - middle) / rest, (most - middle) / rest)
+        inside = _log_probability((-most - middle) / rest, (most - middle) / rest)
     density = -0.5 * ((first - mean[0]) / deviation) ** 2
     return float(np.subtract(logsumexp(density + inside), logsumexp(density)))
 
 
-def _log_within(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+def _log_probability(low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """log(Φ(high) - Φ(low)) of the standard Gaussian distribution Φ."""
     turned = low > 0.0  # the tail that loses no digits
     low, high = np.where(turned, -high, low), np.where(turned, -low, high)

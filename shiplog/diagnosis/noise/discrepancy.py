@@ -32,8 +32,8 @@ from shiplog.models.mmg import geometry
 from shiplog.nomenclature import frames
 from shiplog.ship_profile.profile import Actuator, Profile
 
-SEEN = ("motion", "controls", "wind")  # by a model of forces
-UNSEEN = ("position", "heading", "time")
+MODELLED = ("motion", "controls", "wind")  # by a model of forces
+OMITTED = ("position", "heading", "time")
 EVEN = {"position": 3, "heading": 1, "time": 2}  # features of an even force, the first ones
 HARD_OVER = np.deg2rad(35.0)  # of most rudders (SOLAS II-1/29)
 WAVES = {"motion": 10, "controls": 10, "wind": 4, "position": 14, "heading": 6, "time": 5}
@@ -79,12 +79,14 @@ class Family:
         body axes; those of an even force come first, and are not divided by √F."""
         values = (features(self.name, self.profile, self.waves, nodes) - self.level) / self.scale
         plain = EVEN.get(self.name, 0)
-        out = segment_nodes.in_each_channel(values[..., plain:] / np.sqrt(values.shape[-1] - plain))
+        out = segment_nodes.repeat_for_channels(
+            values[..., plain:] / np.sqrt(values.shape[-1] - plain)
+        )
         if self.name == "position":
             out = _turned(out, nodes)
         if not plain:
             return out
-        even = segment_nodes.in_each_channel(values[..., :plain])
+        even = segment_nodes.repeat_for_channels(values[..., :plain])
         even[..., 2, 2 * plain] = 0.0  # a steady moment is the ship's own
         return np.concatenate((_turned(even, nodes), out), -1)
 
@@ -115,7 +117,7 @@ class Discrepancy:
         return np.concatenate(parts, axis=-1)
 
 
-def of(
+def build(
     profile: Profile, acceleration: np.ndarray, first: int, names: Sequence[str], *campaigns: Nodes
 ) -> Discrepancy:
     """The families that these campaigns can show anything of.
@@ -132,7 +134,7 @@ def of(
         parts = [features(name, profile, waves, nodes) for nodes in campaigns]
         both = np.concatenate([values.reshape(-1, values.shape[-1]) for values in parts])
         # a constant force depends on nothing
-        level = both.mean(0) if name in UNSEEN else np.zeros(both.shape[-1])
+        level = both.mean(0) if name in OMITTED else np.zeros(both.shape[-1])
         level[: EVEN.get(name, 0)] = 0.0  # but along the earth's axes it depends on the heading
         scale = np.sqrt(((both - level) ** 2).mean(0))
         # a feature that hardly varies says nothing, and must not be blown up
@@ -167,7 +169,7 @@ def features(name: str, profile: Profile, waves: Waves, nodes: Nodes) -> np.ndar
     hydrodynamics, or of an even force, then the smooth ones."""
     inputs = _inputs(name, nodes)
     smooth = waves(inputs)
-    if name in UNSEEN:
+    if name in OMITTED:
         return np.concatenate((_even(name, inputs, waves), smooth), -1)
     products = PRODUCTS.get(name)
     if products is None:
@@ -210,7 +212,7 @@ def apparent_flow(nodes: Nodes) -> np.ndarray:
     return np.stack((ahead + state[..., 1], starboard + state[..., 3]), -1)
 
 
-def _of_motion(profile: Profile, nodes: Nodes) -> list[np.ndarray]:
+def _motion_products(profile: Profile, nodes: Nodes) -> list[np.ndarray]:
     """u, v, r, u|u|, v|v|, r|r|, uv, ur, vr, |u|v, |u|r, |v|r, |r|v (Abkowitz 1964; moduli after
     Fedyaevsky & Sobolev 1964)."""
     u, v, r = (nodes.state[..., [i]] for i in (1, 3, 5))
@@ -220,10 +222,10 @@ def _of_motion(profile: Profile, nodes: Nodes) -> list[np.ndarray]:
     ]  # fmt: skip
 
 
-def _of_controls(profile: Profile, nodes: Nodes) -> list[np.ndarray]:
+def _control_products(profile: Profile, nodes: Nodes) -> list[np.ndarray]:
     """n|n| and |n|u of every unit that drives, n in rev/s; of every angle δ
 
-        sin δ u|u|,  1 - cos δ,  n|n| sin δ,  n|n| (1 - cos δ)   of each unit of `driven_by`,
+        sin δ u|u|,  1 - cos δ,  n|n| sin δ,  n|n| (1 - cos δ)   of each unit of `driving_units`,
         sin(πδ/δ_max) u|u|,  sin(πδ/δ_max) n|n|                  of a rudder,
 
     whose force need not grow with its angle (stall, play, a stop)."""
@@ -240,8 +242,8 @@ def _of_controls(profile: Profile, nodes: Nodes) -> list[np.ndarray]:
         found += [np.sin(angle) * u * np.abs(u), 1.0 - np.cos(angle)]
         bent = []
         if actuator.kind == "rudder":
-            bent = [np.sin(np.pi * angle / hard_over(actuator))]
-        for j in driven_by(profile, i, driving):
+            bent = [np.sin(np.pi * angle / largest_angle(actuator))]
+        for j in driving_units(profile, i, driving):
             thrust = nodes.driven[..., [j]] * np.abs(nodes.driven[..., [j]])
             found += [thrust * np.sin(angle), thrust * (1.0 - np.cos(angle))]
             found += [thrust * shape for shape in bent]
@@ -249,19 +251,19 @@ def _of_controls(profile: Profile, nodes: Nodes) -> list[np.ndarray]:
     return found
 
 
-def hard_over(rudder: Actuator) -> float:
+def largest_angle(rudder: Actuator) -> float:
     """The largest angle of a rudder, rad: of its limits, or 35 degrees without any."""
     return geometry.reach(rudder) or HARD_OVER
 
 
-def driven_by(profile: Profile, angle: int, driving: list[int]) -> list[int]:
+def driving_units(profile: Profile, angle: int, driving: list[int]) -> list[int]:
     """Units whose jet an angle turns: those at the same place, or else the first two."""
     place = profile.actuators[angle].position_m
     same = [j for j in driving if profile.actuators[j].position_m == place]
     return same or driving[:2]
 
 
-def _of_wind(profile: Profile, nodes: Nodes) -> list[np.ndarray]:
+def _wind_products(profile: Profile, nodes: Nodes) -> list[np.ndarray]:
     """U_A² cos kα and U_A² sin kα, k = 1, 2, 3: harmonics of the apparent wind's angle α."""
     wind = apparent_flow(nodes)
     square, angle = (wind**2).sum(-1, keepdims=True), np.arctan2(wind[..., [1]], wind[..., [0]])
@@ -269,7 +271,7 @@ def _of_wind(profile: Profile, nodes: Nodes) -> list[np.ndarray]:
 
 
 PRODUCTS: dict[str, Callable[[Profile, Nodes], list[np.ndarray]]] = {
-    "motion": _of_motion, "controls": _of_controls, "wind": _of_wind,
+    "motion": _motion_products, "controls": _control_products, "wind": _wind_products,
 }  # fmt: skip
 
 

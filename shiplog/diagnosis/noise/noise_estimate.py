@@ -48,13 +48,13 @@ def estimate(
     d   [C] the numbers of the columns, SI
     """
     left = (linear.e - linear.j @ d)[..., None]
-    products = _by_channel(linear, left, process_noise)
+    products = _channel_products(linear, left, process_noise)
     counted = np.maximum(linear.cut.used.sum((0, 1)), 1)
     nodes = (linear.z.shape[-1] - 6) // 3
     T_inverse = np.linalg.inv(decay(process_noise.node_step * np.arange(nodes), process_noise.time))
     least = np.log(np.concatenate((LEAST_NOISE, np.full(3, 1e-12))))
 
-    def at(sizes: np.ndarray) -> ProcessNoise:
+    def sized(sizes: np.ndarray) -> ProcessNoise:
         return replace(process_noise, noise=np.exp(sizes[:6]), acceleration=np.exp(sizes[6:]))
 
     def step(sizes: np.ndarray) -> np.ndarray:
@@ -63,7 +63,7 @@ def estimate(
 
             σ_c² = Σ_s tr(S_c E)/n_c,   q_c² = mean_s tr(T⁻¹ E_aa)/J
         """
-        now = at(sizes)
+        now = sized(sizes)
         S = np.tensordot(now.noise**-2.0, products, 1)
         V = np.linalg.inv(S[:, 1:, 1:] + now.precision(nodes))
         z = V @ S[:, 1:, :1]
@@ -83,10 +83,10 @@ def estimate(
         bend = float(np.linalg.norm(second - first))
         leap = float(np.clip(np.linalg.norm(first) / max(bend, 1e-12), 1.0, LEAP))
         sizes = step(sizes + 2.0 * leap * first + leap**2 * (second - first))
-    return _coloured(linear, left, at(sizes))
+    return _coloured(linear, left, sized(sizes))
 
 
-def _by_channel(linear: Linear, left: np.ndarray, process_noise: ProcessNoise) -> np.ndarray:
+def _channel_products(linear: Linear, left: np.ndarray, process_noise: ProcessNoise) -> np.ndarray:
     """S_c = [r | Z]ᵀ Γ⁻¹ [r | Z] [6, S, 1 + 6 + 3J, 1 + 6 + 3J] in each channel c alone, were its
     noise of unit size: what its size is changes but their weight, 1/σ_c²."""
     by = Whitening(linear.cut.used, replace(process_noise, noise=np.ones(6))).by

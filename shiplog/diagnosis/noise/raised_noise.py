@@ -27,7 +27,7 @@ FACTORS = (1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)  # of the process nois
 
 
 @dataclass(frozen=True)
-class Left:
+class Residual:
     """What a hypothesis leaves of a trial, to be explained by noise.
 
     nominal   process noise of the nominal campaign
@@ -46,9 +46,9 @@ class Left:
         return -0.5 * self.counts * (float(self.weight @ each) + volume)
 
 
-def left_by(
+def residual(
     linear: Linear, d: np.ndarray, nominal: ProcessNoise, weight: np.ndarray, counts: float
-) -> Left:
+) -> Residual:
     """r = e - J d: what numbers d [C], SI, leave of a pass; weight w [S] of its segments. Raises
     np.linalg.LinAlgError where its path diverged."""
     kept = weight > 0.0  # a segment that says nothing has no likelihood
@@ -56,10 +56,12 @@ def left_by(
     # subtracted before it is squared: of products small differences of large numbers would be left
     alone = replace(linear, e=linear.e - linear.j @ d, j=linear.j[..., :0])
     startless = likelihood.startless(likelihood.weighed(alone, nominal), nominal)
-    return Left(startless, nominal, weight, counts)
+    return Residual(startless, nominal, weight, counts)
 
 
-def by_channel(left: Left, at_one_place: Remainder | None = None) -> tuple[float, Remainder]:
+def raise_channels(
+    left: Residual, at_one_place: Remainder | None = None
+) -> tuple[float, Remainder]:
     """max over (log c_u, log c_v, log c_r, log c_τ) of log p(r | c), nats, and the factors c of
     surge, sway, yaw rate and correlation time (Nelder & Mead 1965, from the best common factor).
 
@@ -78,7 +80,7 @@ def by_channel(left: Left, at_one_place: Remainder | None = None) -> tuple[float
         return replace(found, intermittent=force, force_lasts=force_lasts)
 
     def value(factors: np.ndarray) -> float:
-        return left.likelihood(raised(factors).in_noise(left.nominal))
+        return left.likelihood(raised(factors).apply_to(left.nominal))
 
     alike = max(FACTORS, key=lambda factor: left.likelihood(left.nominal.times(factor)))
     first = np.append(np.full(3, math.log(alike)), 0.0)

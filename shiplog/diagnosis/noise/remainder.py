@@ -76,7 +76,7 @@ class Remainder:
         force = np.zeros(3) if self.intermittent is None else np.array(self.intermittent)
         return float(np.prod(np.hypot(channels, force) / acceleration) ** (1.0 / len(channels)))
 
-    def in_noise(self, process_noise: ProcessNoise, rows: np.ndarray | None = None) -> ProcessNoise:
+    def apply_to(self, process_noise: ProcessNoise, rows: np.ndarray | None = None) -> ProcessNoise:
         """(c_u q_u, c_v q_v, c_r q_r), c_τ τ, p, c_p τ_p: the process noise with the factors of its
         channels and of its time, and the intermittent force in it.
 

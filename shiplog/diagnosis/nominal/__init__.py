@@ -9,7 +9,7 @@ effects: Laird & Ware 1982), and products G_i of blocks g₀₀, g_i and M_i (`n
 
 K is diagonal, of spreads that are plausible before any data; η holds the coefficients to the run's
 own values where they have moved (`nominal_fit.anchored`). With b integrated out, a part's products
-are (`voyage_effects.reduced`; the same with a² D for c, `campaign_prior.of_voyages`)
+are (`voyage_effects.reduced`; the same with a² D for c, `campaign_prior.reduce_voyages`)
 
     G ← G - G_•1 D^½ (I + D^½ M D^½)⁻¹ D^½ G_1•,   of volume log|I + D^½ M D^½|.
 

@@ -5,7 +5,7 @@ In turn, LEARNING_ROUNDS times, about θ* (symbols as in the room's opening):
     D, s     variance of the parts' numbers, sizes of the discrepancy    `voyage_effects.learn`
     w_s      min(1, ROBUST · median(χ²)/χ²_s), χ² with each part's own numbers   `robust_weights`
     σ, q     of the residuals when each part has its own numbers         `noise_estimate`
-    x*(t)    paths about the acceleration of the discrepancy, Φ ŵ        `linearisation.pulled`
+    x*(t)    paths about the acceleration of the discrepancy, Φ ŵ        `linearisation.fit_path`
 
 then a and κ, and the spread of log λ over the parts.
 """
@@ -88,18 +88,18 @@ def nominal_pass(
     numbers: Mapping[str, np.ndarray] | None = None, pulled: bool = True,
 ) -> NominalPass:  # fmt: skip
     """`numbers` of causes that the voyages have; none but on voyages that are not nominal. Whether
-    the path has been `pulled` with them."""
+    the path has been fitted with them."""
     columns = nominal_fit.columns_of(model, setting, start)
     cut, moved, observed = read(model, setting, record, segments.begins(record), numbers)
     whole = np.concatenate((at.theta, columns.numbers(numbers or {})))
     g, path = segments.grid(record), at.path
     wide = nominal_fit.wide_of(setting)
     if not pulled:
-        path = linearisation.pulled(model, whole, cut, g, wide, path)
+        path = linearisation.fit_path(model, whole, cut, g, wide, path)
     linear = linearisation.linear(model, whole, cut, g, path, moved, observed, wide)
     anchor = nominal_fit.anchored(start, at.theta, columns)
-    families = discrepancy.of(
-        record.profile, at.process_noise.acceleration, len(columns.unit), discrepancy.SEEN,
+    families = discrepancy.build(
+        record.profile, at.process_noise.acceleration, len(columns.unit), discrepancy.MODELLED,
         segment_nodes.conditions_at_nodes(linear.cut, g),
     )  # fmt: skip
     accelerations = families.accelerations(linear.cut, g)
@@ -116,7 +116,7 @@ def characteristics(
 ) -> Characteristics:  # fmt: skip
     """Estimated from the nominal voyages, linearised at their converged coefficients `at`."""
     made = nominal_pass(model, setting, start, record, at, numbers, pulled=not numbers)
-    columns, anchor, K = made.columns, made.anchor, made.columns.known
+    columns, anchor, K = made.columns, made.anchor, made.columns.prior_information
     process_noise = noise_time(made.linear, made.accelerations, columns, anchor, at.process_noise)
     groups = groups_of(model, columns, made.families)
     sized = [family.columns for family in made.families.families]
@@ -161,7 +161,7 @@ def _path_about(
     about = made.accelerations @ expected
     whole = np.concatenate((at.theta, made.columns.numbers(numbers or {})))
     hold = nominal_fit.hold(process_noise, process_noise.acceleration)
-    return linearisation.pulled(
+    return linearisation.fit_path(
         model, whole, made.linear.cut, segments.grid(record), hold, at.path, about=about
     )
 
@@ -232,8 +232,8 @@ def _solved(
     )
     by = np.concatenate(([1.0], columns.unit))
     G = modes.total(np.ones(len(linear.e))) * np.outer(by, by)
-    M_K = G[1:, 1:] + np.diag(columns.known)
-    value = marginal(G, np.diag(columns.known), anchor) - 0.5 * modes.log_volume()
+    M_K = G[1:, 1:] + np.diag(columns.prior_information)
+    value = marginal(G, np.diag(columns.prior_information), anchor) - 0.5 * modes.log_volume()
     return np.linalg.solve(M_K, G[1:, 0] + anchor) * columns.unit, value
 
 
@@ -243,7 +243,7 @@ def groups_of(model: Extended, columns: Columns, families: Discrepancy) -> dict[
     part = np.array([name.split(".")[0] for name in model.base.names])
     found = {f"{name} coefficients": np.flatnonzero(part == name)
              for name in dict.fromkeys(part.tolist())}  # fmt: skip
-    found |= {c.label: columns.of[c.label] for c in model.causes if c.varies}
+    found |= {c.label: columns.indices[c.label] for c in model.causes if c.varies}
     return found | {f"{f.name} discrepancy": f.columns for f in families.families}
 
 

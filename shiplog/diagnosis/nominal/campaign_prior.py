@@ -46,7 +46,7 @@ def prior(
     return Lambda, Lambda @ m
 
 
-def of_voyages(
+def reduce_voyages(
     parts: Sequence[np.ndarray], voyages: np.ndarray, deviation: np.ndarray,
     within: np.ndarray | None = None,
 ) -> tuple[list[np.ndarray], list[float]]:  # fmt: skip
@@ -92,7 +92,7 @@ def learn(
     K = effects.size**-2.0
     count = len(np.unique(voyages))
     best, chosen = -np.inf, (float(np.sqrt(np.mean(np.square(VOYAGE_SPREADS)))), 1.0)
-    tried = [of_voyages(parts, voyages, apart * effects.deviation) for apart in VOYAGE_SPREADS]
+    tried = [reduce_voyages(parts, voyages, apart * effects.deviation) for apart in VOYAGE_SPREADS]
     for share in INFORMATION_SHARES if count > 1 else ():
         scores = np.zeros(len(VOYAGE_SPREADS))
         for i, (each, volumes) in enumerate(tried):

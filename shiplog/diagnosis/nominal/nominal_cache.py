@@ -46,8 +46,11 @@ def converged(model: Extended, setting: Setting, start: Start, record: Record) -
     if known is not None:
         return _converged(known)
     log.info("the nominal voyages are fitted once for a model, and kept")
-    found = nominal_fit.converged(model, setting, start, record, seen=discrepancy.SEEN)
-    _keep(kept, {"theta": found.theta} | _of_path(found.path) | _process_noise(found.process_noise))
+    found = nominal_fit.converged(model, setting, start, record, seen=discrepancy.MODELLED)
+    _keep(
+        kept,
+        {"theta": found.theta} | _path_arrays(found.path) | _process_noise(found.process_noise),
+    )
     return found
 
 
@@ -62,12 +65,12 @@ def characteristics(
         given = {k: dict(zip(known[f"{k}_names"].tolist(), known[f"{k}_values"].tolist(),
                              strict=True)) for k in ("deviation", "size")}  # fmt: skip
         return Characteristics(
-            _known_process_noise(known), given["deviation"], given["size"],
+            _read_process_noise(known), given["deviation"], given["size"],
             float(known["apart"]), float(known["share"]), float(known["noise"]), known["weight"],
             _path(known),
         )  # fmt: skip
     found = campaign_characteristics.characteristics(model, setting, start, record, at)
-    arrays = _of_path(found.path) | _process_noise(found.process_noise) | {
+    arrays = _path_arrays(found.path) | _process_noise(found.process_noise) | {
         "apart": found.apart, "share": found.share, "noise": found.noise, "weight": found.weight,
     }  # fmt: skip
     for name in ("deviation", "size"):
@@ -92,16 +95,16 @@ def _process_noise(process_noise: ProcessNoise) -> dict:
     return whole | {name: getattr(process_noise, field) for field, name in TIME_FIELDS.items()}
 
 
-def _known_process_noise(arrays: dict) -> ProcessNoise:
+def _read_process_noise(arrays: dict) -> ProcessNoise:
     times = {field: float(arrays[name]) for field, name in TIME_FIELDS.items()}
     return ProcessNoise(**times, **{n: arrays[f"process_noise_{n}"] for n in PROCESS_NOISE})
 
 
 def _converged(arrays: dict) -> Converged:
-    return Converged(arrays["theta"], _path(arrays), _known_process_noise(arrays))
+    return Converged(arrays["theta"], _path(arrays), _read_process_noise(arrays))
 
 
-def _of_path(path: Path) -> dict:
+def _path_arrays(path: Path) -> dict:
     return {"start": path.start, "acceleration": path.acceleration}
 
 

@@ -58,7 +58,7 @@ class Campaign:
     reference: Reference
     effects: VoyageEffects
     discrepancy: Discrepancy
-    unseen: Discrepancy
+    omitted: Discrepancy
     each: tuple[np.ndarray, ...]
     voyage: np.ndarray
     apart: float
@@ -75,13 +75,13 @@ class Campaign:
     def voyages(self) -> tuple[np.ndarray, ...]:
         """Σ_i G_vi of each voyage, its own numbers c ~ N(0, a² D) integrated out."""
         return tuple(
-            campaign_prior.of_voyages(self.parts, self.voyage, self.apart * self.deviation)[0]
+            campaign_prior.reduce_voyages(self.parts, self.voyage, self.apart * self.deviation)[0]
         )
 
     @property
     def deviation(self) -> np.ndarray:
         """D^½ [C + W] of one part's numbers; zero of the unseen families' weights."""
-        return np.append(self.effects.deviation, np.zeros(self.unseen.count))
+        return np.append(self.effects.deviation, np.zeros(self.omitted.count))
 
     def residual(self, record: Record) -> Linear | None:
         """e - J (x̂ + b̂_i) u: the nominal voyages, whose record this is, without what the campaign
@@ -119,16 +119,16 @@ def learn(
         Λ = (V + δ²)⁻¹,  V = (K + κ Σ_v M_v)⁻¹,  m = V (η + κ Σ_v g_v)      `campaign_prior.prior`
 
     δ = a D^½ where there is one voyage only, whose parts then count as voyages. `numbers` as in
-    `assumed`. Raises np.linalg.LinAlgError where a matrix is singular.
+    `assume_campaign`. Raises np.linalg.LinAlgError where a matrix is singular.
     """
     made = nominal_pass(model, setting, start, record, replace(at, path=found.path), numbers)
     columns, anchor, families = made.columns, made.anchor, made.families
-    process_noise, K = found.process_noise, made.columns.known
+    process_noise, K = found.process_noise, made.columns.prior_information
     modes = likelihood.modes(likelihood.weighed(made.linear, process_noise), process_noise).joined(
         made.accelerations
     )
-    unseen = discrepancy.of(
-        record.profile, at.process_noise.acceleration, len(columns.unit), discrepancy.UNSEEN,
+    unseen = discrepancy.build(
+        record.profile, at.process_noise.acceleration, len(columns.unit), discrepancy.OMITTED,
         segment_nodes.conditions_at_nodes(made.linear.cut, segments.grid(record)),
     )  # fmt: skip
     whole = modes.joined(unseen.accelerations(made.linear.cut, segments.grid(record)))
@@ -147,7 +147,7 @@ def learn(
     own = np.zeros(len(K))
     if len(np.unique(voyage)) == 1:  # its parts share its deviation, which another voyage has not
         voyage, own = np.arange(len(parts)), found.apart * deviation
-    voyages, _ = campaign_prior.of_voyages(parts, voyage, found.apart * deviation)
+    voyages, _ = campaign_prior.reduce_voyages(parts, voyage, found.apart * deviation)
     information, pull = prior(voyages, size**-2.0, anchor, own, found.share)
     reference_made = Reference(
         model, setting, at.theta, columns, process_noise, nominal_fit.wide_of(setting),
@@ -166,7 +166,7 @@ def learn(
     )  # fmt: skip
 
 
-def widened(model: Extended, setting: Setting, start: Start) -> Start:
+def widen(model: Extended, setting: Setting, start: Start) -> Start:
     """u_i ← max(u_i, max over causes |Δθ_i|): coefficients at least as free on the nominal voyages
     as any cause of realistic size makes them in a trial."""
     names = model.base.names
@@ -185,14 +185,14 @@ def widened(model: Extended, setting: Setting, start: Start) -> Start:
     return replace(start, spread=spread)
 
 
-def of_reference(made: Reference) -> Campaign:
+def uniform_campaign(made: Reference) -> Campaign:
     """A campaign whose voyages do not differ, and whose model has no discrepancy."""
     none = Discrepancy((), made.process_noise.acceleration)
-    effects = VoyageEffects(np.zeros(len(made.pull)), made.columns.known**-0.5)
+    effects = VoyageEffects(np.zeros(len(made.pull)), made.columns.prior_information**-0.5)
     return Campaign(made, effects, none, none, (), np.zeros(0), 0.0, 0.0, (), np.zeros(0))
 
 
-def assumed(
+def assume_campaign(
     model: Extended, setting: Setting, start: Start, record: Record, given: bool,
     inputs: Network | None = None, numbers: Mapping[str, np.ndarray] | None = None,
 ) -> Campaign:  # fmt: skip
@@ -204,10 +204,12 @@ def assumed(
     numbers  of causes that were found in these voyages: what they explain is no discrepancy
     """
     if inputs is not None:
-        return of_reference(nominal_reference.assume(model, setting, start, record, given, inputs))
-    start = widened(model, setting, start)
+        return uniform_campaign(
+            nominal_reference.assume(model, setting, start, record, given, inputs)
+        )
+    start = widen(model, setting, start)
     rounds = 0 if given else nominal_fit.LINEARISATIONS
-    at = nominal_fit.converged(model, setting, start, record, rounds, discrepancy.SEEN)
+    at = nominal_fit.converged(model, setting, start, record, rounds, discrepancy.MODELLED)
     # how parts differ is learned with coefficients as free as they plausibly are: what all parts
     # have in common must not look like a difference
     found = characteristics(model, setting, start, record, at, numbers)

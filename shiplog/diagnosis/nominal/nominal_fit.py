@@ -76,14 +76,14 @@ def converged(
 
     Raises np.linalg.LinAlgError where the model diverges on every segment from the start.
     """
-    campaign = _Campaign.of(model, setting, start, record, seen)
+    campaign = _Campaign.build(model, setting, start, record, seen)
     here = best = campaign.first()
     halvings, damping = 0, 1.0  # of a move; it grows back once moves are accepted
     ended = here.converged
     for _ in range(rounds):
         if ended:
             break
-        there = campaign.at(campaign.after(here, damping), here)
+        there = campaign.linearise(campaign.move(here, damping), here)
         if there is None or here.better(there, LOST_NATS):
             if halvings == MOST_HALVINGS:
                 break
@@ -94,7 +94,7 @@ def converged(
         here, halvings = there, 0
         if here.better(best):
             best = here
-    return (here if ended else best).at_rest()
+    return (here if ended else best).finish()
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ class _Iterate:
         """gain < NEAR and max|x̂_θ| < CLOSE."""
         return self.solution.gain < NEAR and self.far < CLOSE
 
-    def at_rest(self) -> Converged:
+    def finish(self) -> Converged:
         """The fit that ends here, with the noise estimated once more."""
         noise = self.joint.noise(self.solution.found, self.process_noise, AT_REST)
         return Converged(self.theta, self.path, noise)
@@ -155,7 +155,7 @@ class _Campaign:
     begin: ProcessNoise
 
     @classmethod
-    def of(
+    def build(
         cls, model: Extended, setting: Setting, start: Start, record: Record, seen: Sequence[str]
     ) -> _Campaign:
         columns = columns_of(model, setting, start)
@@ -166,7 +166,7 @@ class _Campaign:
             wide.start, bin=of.bin, node_step=of.node_step,
             intermittent_time=likelihood.INTERMITTENT_TIME_S * of.factor,
         )  # fmt: skip
-        found = discrepancy.of(
+        found = discrepancy.build(
             record.profile, begin.acceleration, columns.linearised, seen,
             segment_nodes.conditions_at_nodes(cut, grid),
         )  # fmt: skip
@@ -179,15 +179,15 @@ class _Campaign:
         """With the coefficients that the fit starts from, about paths onto the measurement."""
         theta = np.clip(self.start.values, self.start.low, self.start.high)
         whole = self._whole(theta)
-        path = linearisation.pulled(self.model, whole, self.cut, self.grid, self.wide)
+        path = linearisation.fit_path(self.model, whole, self.cut, self.grid, self.wide)
         sizes = {family.name: FIRST_SIZE for family in self.families}
         return self._solved(theta, whole, path, self.begin, sizes)
 
-    def at(self, theta: np.ndarray, near: _Iterate) -> _Iterate | None:
+    def linearise(self, theta: np.ndarray, near: _Iterate) -> _Iterate | None:
         """With other coefficients, about paths that a linearisation near them predicts; None where
         the model diverges."""
         whole = self._whole(theta)
-        path = linearisation.ahead(
+        path = linearisation.predict_path(
             near.joint.linear, whole - near.whole,
             hold(near.process_noise, near.process_noise.acceleration),
             self.accelerations @ near.solution.weights,
@@ -197,7 +197,7 @@ class _Campaign:
         except np.linalg.LinAlgError:
             return None
 
-    def after(self, here: _Iterate, damping: float) -> np.ndarray:
+    def move(self, here: _Iterate, damping: float) -> np.ndarray:
         """θ* + α u x̂_θ [P], α = damping · min(1, LONGEST_MOVE/max|x̂_θ|): one damped step on."""
         step = (here.solution.found * self.columns.unit)[: len(here.theta)]
         return here.theta + step * damping * min(1.0, LONGEST_MOVE / max(here.far, 1e-12))
@@ -282,7 +282,7 @@ class _Joint:
         for step in range(SIZE_STEPS + 1):
             K = self._prior_information(sizes)
             V = np.linalg.inv(G[1:, 1:] + np.diag(K))
-            x, gain = most_probable_within(V @ (G[1:, 0] + self.anchor), V, self.room)
+            x, gain = most_probable_in_room(V @ (G[1:, 0] + self.anchor), V, self.room)
             if step == SIZE_STEPS or not self.families:
                 break
             for family in self.families:
@@ -304,7 +304,7 @@ class _Joint:
 
     def _prior_information(self, sizes: Mapping[str, float]) -> np.ndarray:
         """K [C]: that of the columns, and 1/s_f² of a family's weights."""
-        K = self.columns.known.copy()
+        K = self.columns.prior_information.copy()
         for family in self.families:
             K[family.columns] = sizes[family.name] ** -2.0
         return K
@@ -317,7 +317,7 @@ class _Joint:
         return noise_estimate.estimate(left, numbers, process_noise, rounds=rounds)
 
 
-def most_probable_within(
+def most_probable_in_room(
     free: np.ndarray, covariance: np.ndarray, room: np.ndarray
 ) -> tuple[np.ndarray, float]:
     """The most probable numbers [C] with the first P of them (θ) within `room` [2, P], and the nats
@@ -330,7 +330,7 @@ def most_probable_within(
     covariance  V [C, C], theirs
     """
     theta = slice(room.shape[1])
-    x_theta = bounds.within(free[theta], covariance[theta, theta], *room)
+    x_theta = bounds.bounded_mode(free[theta], covariance[theta, theta], *room)
     information = np.linalg.inv(covariance[theta, theta])
     gain = float(x_theta @ information @ (free[theta] - 0.5 * x_theta))
     # the other numbers go with those that a bound keeps from where they would be

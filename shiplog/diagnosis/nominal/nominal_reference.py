@@ -79,16 +79,21 @@ class Reference:
         """log|Λ|."""
         return float(np.linalg.slogdet(self.information)[1])
 
-    def apart(self, one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]) -> float:
+    def distance(self, one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]) -> float:
         """max |q₁ - q₂|/u: the most that a number differs, in units of its size; of the same
         causes, label → numbers q, SI."""
         columns = self.columns
         return max(
-            (float(np.abs((one[n] - other[n]) / columns.unit[columns.of[n]]).max()) for n in one),
+            (
+                float(np.abs((one[n] - other[n]) / columns.unit[columns.indices[n]]).max())
+                for n in one
+            ),
             default=0.0,
         )
 
-    def about(self, cut: segments.Cut, g: segments.SegmentGrid) -> np.ndarray | None:
+    def expected_acceleration(
+        self, cut: segments.Cut, g: segments.SegmentGrid
+    ) -> np.ndarray | None:
         """Φ ŵ [S, 3J]: acceleration that is expected at a path's nodes, that of the discrepancy. A
         path that had to do without would be off by more than the process noise, and what is not
         linear in that would look like a change."""
@@ -96,10 +101,10 @@ class Reference:
             return None
         return self.misfit.accelerations(cut, g) @ self.expected
 
-    def held(self, noise_factor: float, remainder: Remainder) -> Wide:
+    def allowed_distance(self, noise_factor: float, remainder: Remainder) -> Wide:
         """Allowed distance of a path, FREE √(λ² q² + p²) of the acceleration, where the process
         noise has the factor λ = `noise_factor`, with a remainder."""
-        of = remainder.in_noise(self.process_noise)
+        of = remainder.apply_to(self.process_noise)
         acceleration = noise_factor * of.acceleration
         if of.intermittent is not None:
             acceleration = np.hypot(acceleration, of.intermittent)
@@ -164,7 +169,8 @@ def assume(
     linear = linearisation.linear(model, whole, cut, g, at.path, moved, observed)
     modes = likelihood.modes(likelihood.weighed(linear, at.process_noise), at.process_noise)
     wrong = input_misfit.estimate(
-        inputs, linear.cut, g, modes, columns.known, columns.unit, at.process_noise.acceleration
+        inputs, linear.cut, g, modes, columns.prior_information, columns.unit,
+        at.process_noise.acceleration,
     )  # fmt: skip
     anchor = np.append(anchored(start, at.theta, columns), np.zeros(wrong.count))
     columns = columns.with_misfit(wrong.count)
@@ -172,9 +178,9 @@ def assume(
     names = np.unique(linear.cut.voyage)
     by = np.concatenate(([1.0], columns.unit))
     each = [modes.total((linear.cut.voyage == v).astype(float)) for v in names]
-    kappa = inflation(np.stack(each) * np.outer(by, by), columns.known, anchor)
+    kappa = inflation(np.stack(each) * np.outer(by, by), columns.prior_information, anchor)
     # without a nominal campaign no cause has a nominal size
-    K = columns.known.copy()
+    K = columns.prior_information.copy()
     K[columns.base : columns.linearised] = HELD_INFORMATION
     return Reference(
         model, setting, at.theta, columns, at.process_noise, wide_of(setting), np.diag(K),
@@ -190,7 +196,7 @@ def with_causes(reference: Reference, causes: Sequence[Cause]) -> Reference:
     first, last = columns.base, columns.linearised
     more = sum(len(size) for size in sizes)
 
-    def widened(values: np.ndarray, own: float) -> np.ndarray:
+    def extend(values: np.ndarray, own: float) -> np.ndarray:
         return np.concatenate((values[:first], np.full(more, own), values[last:]))
 
     constants = {**constants_of(causes, setting), **reference.model.constants}
@@ -201,7 +207,7 @@ def with_causes(reference: Reference, causes: Sequence[Cause]) -> Reference:
             first, tuple(causes),
             np.concatenate((columns.unit[:first], *sizes, columns.unit[last:])), columns.misfit,
         ),
-        information=np.diag(widened(np.diag(reference.information), HELD_INFORMATION)),
-        pull=widened(reference.pull, 0.0),
-        anchor=widened(reference.anchor, 0.0),
+        information=np.diag(extend(np.diag(reference.information), HELD_INFORMATION)),
+        pull=extend(reference.pull, 0.0),
+        anchor=extend(reference.anchor, 0.0),
     )  # fmt: skip

@@ -25,8 +25,8 @@ def placebos(campaign: Campaign) -> Mapping[str, float]:
     """
     columns, share = campaign.reference.columns, campaign.reference.counts
     tested: dict[str, tuple[np.ndarray, tuple[float, ...]]]
-    tested = {label: (at, (1.0,)) for label, at in columns.of.items()}
-    for family in (*campaign.discrepancy.families, *campaign.unseen.families):
+    tested = {label: (at, (1.0,)) for label, at in columns.indices.items()}
+    for family in (*campaign.discrepancy.families, *campaign.omitted.families):
         tested[family.name] = (family.columns, CHANGE_SIZES)
     most = dict.fromkeys(tested, 0.0)
     for left_out, gram in enumerate(campaign.voyages):

@@ -92,7 +92,7 @@ def learn(
     """
     free = np.sort(np.concatenate([np.zeros(0, int), *groups]))
     problem = _EffectsProblem(
-        [_Part.of(gram, free) for gram in each], free, known, pull, list(groups), list(sized)
+        [_Part.select(gram, free) for gram in each], free, known, pull, list(groups), list(sized)
     )
     sizes = np.log(np.full(len(problem.groups) + len(problem.sized), FIRST_DEVIATION**2))
     for at, columns in enumerate(problem.sized, len(problem.groups)):
@@ -122,7 +122,7 @@ class _Part:
     both: np.ndarray
 
     @classmethod
-    def of(cls, gram: np.ndarray, free: np.ndarray) -> _Part:
+    def select(cls, gram: np.ndarray, free: np.ndarray) -> _Part:
         """M = G₁₁, g = G₁₀ and their rows F = `free` of a part's products G."""
         m, g = np.ascontiguousarray(gram[1:, 1:]), gram[1:, 0]
         return cls(m, g, m[free], g[free], m[np.ix_(free, free)])

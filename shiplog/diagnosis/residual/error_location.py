@@ -88,7 +88,7 @@ def find_omitted_inputs(trial: Trial, nothing: Fit, whole: Linear) -> tuple[Depe
     """What the model cannot see and the residual depends on, with no cause named."""
     found = residual_acceleration.posterior(
         *fits.residual(trial, whole, nothing),
-        trial.process_noise(nothing.remainder, whole.cut).times(nothing.found.noise_factor),
+        trial.process_noise(nothing.remainder, whole.cut).times(nothing.estimate.noise_factor),
         trial.record,
     )  # fmt: skip
     nodes = residual_acceleration.table(found, trial.record)
@@ -102,7 +102,7 @@ def uncovered_windows(
 ) -> list[Interval]:
     """Windows outside the training data."""
     rows = store.seconds(names, profile)
-    trained = covering.of(run.training(), profile.actuator_names, profile.has_wind)
+    trained = covering.learn(run.training(), profile.actuator_names, profile.has_wind)
     numbered = cut.plan.select(
         "voyage", pl.int_range(pl.len()).over("voyage").alias("window"), "segment", "start",
         "elapsed",

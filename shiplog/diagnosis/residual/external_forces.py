@@ -178,7 +178,9 @@ def balance(
     own += np.where(_resting(record, physics, rows), RESTING, 1.0)[:, None] * full
     if physics.geometry.wind:
         angle = np.linspace(0.0, 2.0 * math.pi, 73)
-        worst = np.abs(np.asarray(_of_wind(physics, values, np.cos(angle), np.sin(angle)))).max(0)
+        worst = np.abs(np.asarray(_wind_force(physics, values, np.cos(angle), np.sin(angle)))).max(
+            0
+        )
         speed = np.linalg.norm(residual_acceleration.means_about(record, record.wind, rows), axis=1)
         own += (GUST * speed[:, None]) ** 2 * worst
     return Balance(rows, F, sd_F, own, misfit, full)
@@ -197,7 +199,7 @@ def _masses(physics, values):
 
 
 @traced
-def _of_wind(physics, values, ahead, starboard):
+def _wind_force(physics, values, ahead, starboard):
     return air.wind(named(physics.names, values), physics.geometry, ahead, starboard)
 
 

@@ -48,43 +48,46 @@ class Manoeuvre:
         return self.words.format(*(f"{factor * time:.0f} s" for time in self.times))
 
 
-def _still(t: np.ndarray, share: float) -> np.ndarray:
+def _constant(t: np.ndarray, share: float) -> np.ndarray:
     """The same share at all times t [n]."""
     return np.full(len(t), share)
 
 
-def _in_turn(t: np.ndarray, half: float) -> np.ndarray:
+def _square_wave(t: np.ndarray, half: float) -> np.ndarray:
     """1 and -1, so many seconds each."""
     return np.where((t // half) % 2 < 1, 1.0, -1.0)
 
 
 MANOEUVRES = (
     Manoeuvre(
-        "one slow full turn to either side", lambda t: (_still(t, 0.6), 0.4 * _in_turn(t, 150.0))
+        "one slow full turn to either side",
+        lambda t: (_constant(t, 0.6), 0.4 * _square_wave(t, 150.0)),
     ),
     Manoeuvre(
-        "a zigzag, {} to either side", lambda t: (_still(t, 0.8), 0.8 * _in_turn(t, 30.0)), (30.0,)
+        "a zigzag, {} to either side",
+        lambda t: (_constant(t, 0.8), 0.8 * _square_wave(t, 30.0)),
+        (30.0,),
     ),
     Manoeuvre(
         "doublets of {} at constant revolutions",
-        lambda t: (_still(t, 0.7), _in_turn(t, 3.0)),
+        lambda t: (_constant(t, 0.7), _square_wave(t, 3.0)),
         (3.0,),
     ),
     Manoeuvre(
         "full power and no power in turn, {} each, on a straight course",
-        lambda t: (0.5 + 0.5 * _in_turn(t, 60.0), _still(t, 0.0)),
+        lambda t: (0.5 + 0.5 * _square_wave(t, 60.0), _constant(t, 0.0)),
         (60.0,),
     ),
     Manoeuvre(
         "bursts of full power from rest, {} every {}",
-        lambda t: (np.where(t % 60.0 < 10.0, 1.0, 0.0), _still(t, 0.0)),
+        lambda t: (np.where(t % 60.0 < 10.0, 1.0, 0.0), _constant(t, 0.0)),
         (10.0, 60.0),
     ),
     Manoeuvre(
         "the same course out and back",
-        lambda t: (_still(t, 0.7), np.where((t > 110.0) & (t < 150.0), 0.9, 0.0)),
+        lambda t: (_constant(t, 0.7), np.where((t > 110.0) & (t < 150.0), 0.9, 0.0)),
     ),
-    Manoeuvre("a drifting stop", lambda t: (np.where(t < 40.0, 0.7, 0.0), _still(t, 0.0))),
+    Manoeuvre("a drifting stop", lambda t: (np.where(t < 40.0, 0.7, 0.0), _constant(t, 0.0))),
 )
 
 
@@ -129,7 +132,7 @@ def separation(trial: Trial, gram: np.ndarray, one: Named, other: str) -> float:
            + Λ)⁻¹ κM: a manoeuvre counts as much of itself, κ, as a trial does.
     """
     columns = trial.reference.columns
-    a, b = columns.of[one.cause.label], columns.of[other]
+    a, b = columns.indices[one.cause.label], columns.indices[other]
     M = trial.reference.counts * gram[1:, 1:]
     A = M - M @ np.linalg.solve(M + trial.reference.information, M)
     p = one.numbers / columns.unit[a]
@@ -150,7 +153,7 @@ def products_of_manoeuvres(
     rows = segments.begins(recorded)
     cut, moved, observed = read(ref.model, ref.setting, recorded, rows, numbers)
     grid = segments.grid(recorded)
-    path = linearisation.pulled(ref.model, whole, cut, grid, ref.wide, rounds=1)
+    path = linearisation.fit_path(ref.model, whole, cut, grid, ref.wide, rounds=1)
     linear = linearisation.linear(ref.model, whole, cut, grid, path, moved, observed)
     modes = likelihood.modes(likelihood.weighed(linear, ref.process_noise), ref.process_noise)
     if ref.misfit is not None:

@@ -261,14 +261,16 @@ def _gains(shared: _Nodes, known: np.ndarray, designs: list[np.ndarray]) -> np.n
     """R² = (E₀ - E(X₀, X₁))/E₀ [D, 3], E₀ = min(E(X₀), E(∅)): share of the variance that each
     design X₁ predicts beyond X₀ = `known`."""
     whole = np.zeros((len(shared.y), 0))
-    total, before = (_left_out(shared, x) for x in (whole, known))
-    after = np.stack([_left_out(shared, np.concatenate((known, x), 1)) for x in designs])
+    total, before = (_cross_validation_error(shared, x) for x in (whole, known))
+    after = np.stack(
+        [_cross_validation_error(shared, np.concatenate((known, x), 1)) for x in designs]
+    )
     # relative to the better guess without it: a share of the remaining variance
     base = np.minimum(before, total)
     return (base - after) / np.maximum(base, 1e-300)
 
 
-def _left_out(shared: _Nodes, features: np.ndarray) -> np.ndarray:
+def _cross_validation_error(shared: _Nodes, features: np.ndarray) -> np.ndarray:
     """Σ_f E_f(λ_f) [3]: squared error on each fold f in turn, the penalty chosen among the others:
 
         λ_f = argmin_λ Σ_{g ≠ f} E_{g | fg}(λ),   E_{g | fg} on fold g without folds f and g

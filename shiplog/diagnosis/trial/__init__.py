@@ -1,6 +1,6 @@
 """A trial and what its hypotheses share.
 
-The trial is linearised, segment by segment, where a hypothesis stands (`Trial.at`):
+The trial is linearised, segment by segment, where a hypothesis stands (`Trial.linearise`):
 
     r_s = J_s θ + Z_s z_s + ε_s,   z_s ~ N(0, Q(λ)),   ε_s ~ N(0, R_s)                    (1)
 

@@ -14,7 +14,7 @@ from shiplog.diagnosis.noise.remainder import Remainder
 
 
 @dataclass(frozen=True)
-class Found:
+class Estimate:
     """One hypothesis.
 
     evidence       of a base hypothesis its log marginal likelihood [nats]; of a candidate or a
@@ -47,7 +47,7 @@ class ExpectedEvidence:
         """Of each number alone, the size with this expected log Bayes factor [realistic sizes]."""
         return np.sqrt(2.0 * (nats + self.cost) / np.maximum(self.each, 1e-12))
 
-    def together(self, nats: float) -> float:
+    def common_size(self, nats: float) -> float:
         """The size with this expected log Bayes factor, if all its numbers have that size."""
         return float(np.sqrt(2.0 * (nats + self.cost) / max(self.each.sum(), 1e-12)))
 
@@ -81,28 +81,28 @@ class Fit:
     """A hypothesis with the trial linearised where it was found, and what remains with it."""
 
     point: Point
-    found: Found
+    estimate: Estimate
     remainder: Remainder
 
     @property
     def included(self) -> tuple[str, ...]:
         """Labels of the causes that it holds, those of the model with them."""
-        return tuple(self.found.numbers)
+        return tuple(self.estimate.numbers)
 
     @property
     def start(self) -> Start:
         """Where a further fit of the same hypothesis begins."""
-        return Start(self.found.numbers, self.point.path, self.found.noise_factor)
+        return Start(self.estimate.numbers, self.point.path, self.estimate.noise_factor)
 
     @property
     def diverged(self) -> bool:
         """Whether it has no evidence: its numbers are then of no use."""
-        return not math.isfinite(self.found.evidence)
+        return not math.isfinite(self.estimate.evidence)
 
     @property
     def noise_factor(self) -> float:
         """Of the process noise on its nominal one, a geometric mean over the channels."""
-        return self.remainder.overall(self.found.noise_factor)
+        return self.remainder.overall(self.estimate.noise_factor)
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,7 @@ def trial_of(
     if nominal is None:
         inputs = None if run.judges_itself else run.base()[0]
         there = {**run.extension_numbers(), **(numbers or {})}
-        campaign = nominal_campaign.assumed(
+        campaign = nominal_campaign.assume_campaign(
             model, setting, start, recorded, run.given, inputs, there
         )
     else:
@@ -65,7 +65,7 @@ def trial_of(
         before = setting_of(run, nominal, nominal)
         testable, _ = catalogue.testable(before)
         plain, _ = model_of(run, testable, before)
-        start = nominal_campaign.widened(plain, before, start)
+        start = nominal_campaign.widen(plain, before, start)
         at = nominal_cache.converged(plain, before, start, nominal)
         found = nominal_cache.characteristics(plain, before, start, nominal, at)
         if not parts.voyage_effects:
@@ -74,4 +74,4 @@ def trial_of(
         if not parts.share_of_trial:
             found = replace(found, share=1.0)
         campaign = nominal_campaign.learn(model, setting, start, nominal, at, found)
-    return Setup(Trial.of(campaign, recorded, tuple(held)), untested)
+    return Setup(Trial.build(campaign, recorded, tuple(held)), untested)

@@ -52,14 +52,14 @@ class Trial:
     rows: np.ndarray
     parts: tuple[np.ndarray, ...]
     voyage: np.ndarray
-    unseen: Discrepancy
+    omitted: Discrepancy
     weight: np.ndarray
     cache: Cache
     first: Point | None = None
     begun: bool = False
 
     @classmethod
-    def of(
+    def build(
         cls, campaign: Campaign, record: Record, fixed: Sequence[str] = (),
         cache: Cache | None = None, **more: object,
     ) -> Self:  # fmt: skip
@@ -68,8 +68,8 @@ class Trial:
         reference = campaign.reference
         nodes = segment_nodes.conditions_at_nodes(segments.cut(record, rows), grid)
         known = len(reference.columns.unit)
-        unseen = discrepancy.of(
-            record.profile, reference.process_noise.acceleration, known, discrepancy.UNSEEN, nodes
+        unseen = discrepancy.build(
+            record.profile, reference.process_noise.acceleration, known, discrepancy.OMITTED, nodes
         )
         # as long as those from which the campaign knows how far parts differ
         longest = max((len(part) for part in campaign.rows), default=PART)
@@ -87,13 +87,13 @@ class Trial:
     def products(self) -> Products:
         """Products of its segments, at any point of it."""
         return Products(
-            self.campaign, self.unseen, self.grid, self.parts, self.voyage, self.cache
+            self.campaign, self.omitted, self.grid, self.parts, self.voyage, self.cache
         )  # fmt: skip
 
     @cached_property
     def families(self) -> dict[str, np.ndarray]:
         """Family of the discrepancy → its columns."""
-        both = (*self.campaign.discrepancy.families, *self.unseen.families)
+        both = (*self.campaign.discrepancy.families, *self.omitted.families)
         return {family.name: family.columns for family in both}
 
     @property
@@ -127,9 +127,9 @@ class Trial:
         """The nominal one; with an intermittent force in it, where one remains. Of the trial's own
         segments, or of others."""
         rows = segment_nodes.rows_of_nodes(self.rows if cut is None else cut.rows, self.grid)
-        return remainder.in_noise(self.reference.process_noise, rows)
+        return remainder.apply_to(self.reference.process_noise, rows)
 
-    def at(
+    def linearise(
         self,
         numbers: Numbers,
         near: Path | Point | None = None,
@@ -149,20 +149,22 @@ class Trial:
         ref = self.reference
         wide = ref.wide
         if noise_factor is not None:
-            wide = ref.held(noise_factor, remainder or Remainder())
+            wide = ref.allowed_distance(noise_factor, remainder or Remainder())
         cut, moved, observed = self._reading(numbers)
         whole = np.concatenate((ref.theta, ref.columns.numbers(dict(numbers))))
-        about = ref.about(cut, self.grid)
+        about = ref.expected_acceleration(cut, self.grid)
         if isinstance(near, Point):
             stood = np.concatenate((ref.theta, ref.columns.numbers(dict(near.numbers))))
-            path = linearisation.ahead(near.linear, whole - stood, wide, about)
+            path = linearisation.predict_path(near.linear, whole - stood, wide, about)
         else:
             rounds = 1 if near else linearisation.MOST_PULLS
-            path = linearisation.pulled(ref.model, whole, cut, self.grid, wide, near, rounds, about)
+            path = linearisation.fit_path(
+                ref.model, whole, cut, self.grid, wide, near, rounds, about
+            )
         linear = linearisation.linear(
             ref.model, whole, cut, self.grid, path, moved, observed, ref.wide
         )
-        return self._judged(
+        return self._refuse_divergent(
             Point(numbers, path, linear, likelihood.weighed(linear, ref.process_noise))
         )
 
@@ -181,7 +183,7 @@ class Trial:
         }
         alike = (
             kept for before, kept in self.cache.readings
-            if before.keys() == reading.keys() and ref.apart(before, reading) == 0.0
+            if before.keys() == reading.keys() and ref.distance(before, reading) == 0.0
         )  # fmt: skip
         kept = next(alike, None)
         if kept is None:
@@ -190,7 +192,7 @@ class Trial:
         cut, moved, observed = kept
         return as_hypothesised(cut, causes, numbers), moved, observed
 
-    def _judged(self, point: Point) -> Point:
+    def _refuse_divergent(self, point: Point) -> Point:
         if self.begun and (point.linear.lost & (self.weight > 0.0)).any():
             raise np.linalg.LinAlgError("the model diverges with these numbers")
         return point
@@ -205,8 +207,13 @@ class Trial:
         numbers = dict(point.numbers)
         cut, moved, observed = read(ref.model, ref.setting, self.record, rows, numbers)
         whole = np.concatenate((ref.theta, ref.columns.numbers(numbers)))
-        path = linearisation.pulled(
-            ref.model, whole, cut, self.grid, ref.wide, about=ref.about(cut, self.grid)
+        path = linearisation.fit_path(
+            ref.model,
+            whole,
+            cut,
+            self.grid,
+            ref.wide,
+            about=ref.expected_acceleration(cut, self.grid),
         )
         between = linearisation.linear(
             ref.model, whole, cut, self.grid, path, moved, observed, ref.wide
@@ -221,6 +228,6 @@ class Trial:
             linear = linear.less(misfit.accelerations(linear.cut, self.grid) @ d[count:])
         return linear, d[:count]
 
-    def leaving_out(self, segments_out: np.ndarray) -> Self:
+    def leave_out(self, segments_out: np.ndarray) -> Self:
         """The same with segments [S] bool that no hypothesis is judged on."""
         return replace(self, weight=np.where(segments_out, 0.0, self.weight))

@@ -39,7 +39,7 @@ class Products:
     """
 
     campaign: Campaign
-    unseen: Discrepancy
+    omitted: Discrepancy
     grid: SegmentGrid
     parts: Sequence[np.ndarray]
     voyage: np.ndarray
@@ -50,24 +50,24 @@ class Products:
         serves every λ, but that of an intermittent force together with the process noise, whose
         axes turn with it."""
         rows = segment_nodes.rows_of_nodes(point.linear.cut.rows, self.grid)
-        process_noise = remainder.in_noise(self.campaign.reference.process_noise, rows)
+        process_noise = remainder.apply_to(self.campaign.reference.process_noise, rows)
         shape, left = remainder.shape, noise_factor
         if process_noise.intermittent is not None:
             process_noise, shape, left = process_noise.times(noise_factor), (shape, left), 1.0
         for of, known, modes in self.cache.modes:
             if of is point.weighed and known == shape:
                 return modes, left
-        modes = self._with_families(likelihood.modes(point.weighed, process_noise), point)
+        modes = self._join_families(likelihood.modes(point.weighed, process_noise), point)
         first, last = self.cache.modes[:1], self.cache.modes[1:][2 - KEPT_MODES :]
         self.cache.modes = [*first, *last, (point.weighed, shape, modes)]
         return modes, left
 
-    def _with_families(self, modes: Modes, point: Point) -> Modes:
+    def _join_families(self, modes: Modes, point: Point) -> Modes:
         """With the columns of the discrepancy: a weight w acts as an acceleration W w."""
         cut, misfit = point.linear.cut, self.campaign.reference.misfit
         if misfit is not None:
             modes = modes.joined(misfit.accelerations(cut, self.grid))
-        return modes.joined(self.unseen.accelerations(cut, self.grid))
+        return modes.joined(self.omitted.accelerations(cut, self.grid))
 
     def each_part(
         self, point: Point, noise: float, weight: np.ndarray, remainder: Remainder
@@ -77,8 +77,8 @@ class Products:
         one of them, since they are a quarter of all."""
         modes, noise = self.modes(point, noise, remainder)
         unit = self.campaign.reference.columns.unit
-        if remainder.kind in discrepancy.UNSEEN:
-            unit = np.append(unit, np.ones(self.unseen.count))
+        if remainder.kind in discrepancy.OMITTED:
+            unit = np.append(unit, np.ones(self.omitted.count))
         return products(modes.first(len(unit)), self.parts, unit, weight, noise)
 
     def total(
@@ -96,7 +96,7 @@ class Products:
         self.cache.totals = [*self.cache.totals[1 - KEPT_TOTALS :], kept]
         return G, volume
 
-    def leaving_out(
+    def leave_out(
         self, point: Point, noise: float, weight: np.ndarray, remainder: Remainder,
         left_out: np.ndarray,
     ) -> np.ndarray:  # fmt: skip
@@ -125,7 +125,7 @@ class Products:
         """G of each voyage with b_k and c_v integrated out (4), and Σ log|I + D^½ M D^½| (5)."""
         each = self.each_part(point, noise, weight, remainder)
         deviation = self._deviation(remainder)
-        G, volumes = campaign_prior.of_voyages(
+        G, volumes = campaign_prior.reduce_voyages(
             each, self.voyage, self.campaign.apart * deviation, deviation
         )
         return dict(zip(np.unique(self.voyage), G, strict=True)), sum(volumes)
@@ -133,7 +133,7 @@ class Products:
     def _deviation(self, remainder: Remainder) -> np.ndarray:
         """The diagonal of D^½ [C]; of the families that no campaign shows there is none."""
         of = self.campaign.effects.deviation
-        more = self.unseen.count if remainder.kind in discrepancy.UNSEEN else 0
+        more = self.omitted.count if remainder.kind in discrepancy.OMITTED else 0
         return np.append(of, np.zeros(more))
 
     def volume(

@@ -48,7 +48,7 @@ def record_of(store: Store, names: Sequence[str], profile: Profile) -> Record:
     return recording.read([frame.collect() for frame in store.tables(names)], names, profile)
 
 
-def in_ship_time(
+def rescale_time(
     run: Run, nominal: Record | None, recorded: Record
 ) -> tuple[Record | None, Record]:
     """Both campaigns with the time scale of this ship at the working speed of its nominal

@@ -97,13 +97,13 @@ def decide(
     stands = verdict in ("named", "unknown") or (verdict == "none" and not best.causes)
     reported = fit if stands else table.fit(table.nothing)
     if side_force is not None:
-        reported = _with_side_force(reported, side_force)
+        reported = _add_side_force(reported, side_force)
     return Decision(
         verdict=verdict, named=named, structure=structure, side_force=side_force, traces=traces,
         rejected=_reasons(search, found, refuted | dict(doubted or {}) | in_doubt, named),
         ranking=found.ranking(either, why, p_device),
-        fit=reported, nothing=Fit(table.first, table.nothing.found, reported.remainder),
-        expected=search.expected, one_of=_in_addition(table, found, best, named),
+        fit=reported, nothing=Fit(table.first, table.nothing.estimate, reported.remainder),
+        expected=search.expected, one_of=_additional_causes(table, found, best, named),
         either=either, why=why,
     ), found  # fmt: skip
 
@@ -126,7 +126,7 @@ def _imitated(
         if label in table.trial.fixed or name not in names:
             continue
         if table.parts.imitation and not posteriors.slight(table, best, name):
-            size = _size_without(table, fit.remainder, name)
+            size = _needed_size(table, fit.remainder, name)
             share = fits.imitated(table.trial, fit, label, size)
             shares[name] = max(share, shares.get(name, 0.0))
     return {
@@ -136,7 +136,7 @@ def _imitated(
     }
 
 
-def _size_without(table: Hypotheses, remainder: Remainder, name: str) -> float:
+def _needed_size(table: Hypotheses, remainder: Remainder, name: str) -> float:
     """How large a remainder of this kind would be if it had to do the work of a cause: in the most
     probable hypothesis without it. With the cause, it is only what the cause leaves."""
     others = (h.remainder.size for h in table.ranked(name) if h.kind == remainder.kind)
@@ -151,13 +151,13 @@ def _named(
     error that all its numbers share."""
     by, columns = table.by, table.trial.reference.columns
     given, at = [], 0
-    for label in best.found.numbers:
-        part = slice(at, at + len(columns.of[label]))
+    for label in best.estimate.numbers:
+        part = slice(at, at + len(columns.indices[label]))
         at = part.stop
         if label not in by or name_of(label) not in names or not found.states(label):
             continue
-        assert best.found.covariance is not None
-        numbers = np.asarray(best.found.numbers[label])
+        assert best.estimate.covariance is not None
+        numbers = np.asarray(best.estimate.numbers[label])
         share = form_error_of(by[label]) if table.parts.form_error else 0.0
         fx = share * numbers  # its equations are no better than that
         ux = by[label].unit_error * numbers  # one error of all numbers of the cause
@@ -165,14 +165,14 @@ def _named(
             Named(
                 by[label], table.alone.get(label, float("nan")),
                 found.names.get(name_of(label), 0.0), numbers,
-                best.found.covariance[part, part] + np.diag(fx**2) + np.outer(ux, ux),
-                _instead(found, best, label), table.trial.reference.freedom,
+                best.estimate.covariance[part, part] + np.diag(fx**2) + np.outer(ux, ux),
+                _substitutes(found, best, label), table.trial.reference.freedom,
             )
         )  # fmt: skip
     return tuple(given)
 
 
-def _in_addition(
+def _additional_causes(
     table: Hypotheses, found: Posterior, best: Hypothesis, named: Sequence[Named]
 ) -> tuple[str, ...]:
     """Names of which one acts in addition to those that are named. A remainder that is not slight
@@ -182,7 +182,7 @@ def _in_addition(
     return found.one_of if named and clear else ()
 
 
-def _instead(found: Posterior, best: Hypothesis, label: str) -> tuple[str, ...]:
+def _substitutes(found: Posterior, best: Hypothesis, label: str) -> tuple[str, ...]:
     """Labels of causes of another name that may stand in a cause's place: of hypotheses with that
     one instead and score_best - score < INSTEAD_NATS."""
     rest = set(best.causes) - {label}
@@ -207,7 +207,7 @@ def _structure(table: Hypotheses, best: Hypothesis, fit: Fit) -> Structure:
     return Structure(family, gained, fits.acts_on(table.trial, fit, best.kind))
 
 
-def _with_side_force(fit: Fit, side_force: SideForce) -> Fit:
+def _add_side_force(fit: Fit, side_force: SideForce) -> Fit:
     """The same with the intermittent force in its remainder."""
     return replace(fit, remainder=side_force.remainder)
 

@@ -59,7 +59,7 @@ def gain(trial: Trial, point: Point, numbers: Numbers, pair: tuple[Actuator, Act
     actuator = record.actuator.copy()
     actuator[:, columns] = record.actuator[:, columns[::-1]]
     as_read, _ = evidence.scan(trial, point, (), trial.fixed)
-    other = Trial.of(trial.campaign, replace(record, actuator=actuator), trial.fixed)
+    other = Trial.build(trial.campaign, replace(record, actuator=actuator), trial.fixed)
     try:
         other, at = evidence.begin(other, numbers)
     except np.linalg.LinAlgError:

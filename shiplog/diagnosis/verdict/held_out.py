@@ -95,7 +95,7 @@ class HeldOut(Rollouts):
         states = np.empty(self.cut.state.shape)
         needed = self._constants(decision)
         for voyage, half, rows in self.folds():
-            numbers, coefficients = self.without(decision, voyage, half)
+            numbers, coefficients = self.refit(decision, voyage, half)
             if absent:
                 numbers = numbers | {absent: np.zeros_like(numbers[absent])}
             simulator = self.before.with_causes(
@@ -233,7 +233,7 @@ class HeldOut(Rollouts):
                 if len(rows):
                     yield name, (middle, late), rows
 
-    def without(
+    def refit(
         self, decision: Decision, voyage: str, half: Half
     ) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
         """Numbers of the named causes, fitted without a part of the data; and the coefficients

@@ -43,12 +43,12 @@ class Own:
     def _extended_by(self, decision: Decision) -> tuple[Trial, Fit, Fit]:
         """The trial, and its fits with what is named and with nothing."""
         causes = (*self.held, *(n.cause for n in decision.named))
-        campaign = nominal_campaign.of_reference(
+        campaign = nominal_campaign.uniform_campaign(
             nominal_reference.with_causes(self.reference, causes)
         )
-        trial = Trial.of(campaign, self.judge.record, [c.label for c in causes])
+        trial = Trial.build(campaign, self.judge.record, [c.label for c in causes])
         trial, first = evidence.begin(trial, self.numbers)
-        trial = trial.leaving_out(self.judge.weight == 0.0)
+        trial = trial.leave_out(self.judge.weight == 0.0)
 
         def fitted(point, included) -> Fit:
             found, _ = evidence.scan(trial, point, (), included, remainder=ANY_NOISE)
@@ -59,5 +59,5 @@ class Own:
             return trial, nothing, nothing
         numbers = {n.cause.label: n.numbers for n in decision.named}
         both = {**self.numbers, **numbers}
-        point = trial.at(both, first, nothing.found.noise_factor)
+        point = trial.linearise(both, first, nothing.estimate.noise_factor)
         return trial, fitted(point, trial.fixed), nothing

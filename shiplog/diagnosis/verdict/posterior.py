@@ -140,11 +140,11 @@ def posterior(search: Search) -> Posterior:
             hidden[name] = hidden.get(name, 0.0) + float(np.exp(one - score.max())) / weight
     order = sorted(names, key=lambda name: -names[name])
     names = {n: names[n] for n in order}
-    one_of = _one_of(names, large_in, share)
+    one_of = _alternatives(names, large_in, share)
     return Posterior(tuple(kept), share, names, labels, kinds, none, hidden, one_of)
 
 
-def _one_of(
+def _alternatives(
     names: Mapping[str, float], large_in: Sequence[Mapping[str, float]], share: np.ndarray
 ) -> tuple[str, ...]:
     """The fewest of the likeliest unstated names with 1 - Σ_h p_h Π_names (1 - P_h(practical)) of
@@ -163,10 +163,10 @@ def practical(table: Hypotheses, one: Hypothesis) -> dict[str, float]:
     [SI], that are large enough to matter."""
     if not table.parts.practical_size:
         return dict.fromkeys(one.causes, 1.0)
-    reference, covariance = table.trial.reference, one.found.covariance
+    reference, covariance = table.trial.reference, one.estimate.covariance
     found, at = {}, 0
-    for label, numbers in one.found.numbers.items():
-        part = slice(at, at + len(reference.columns.of[label]))
+    for label, numbers in one.estimate.numbers.items():
+        part = slice(at, at + len(reference.columns.indices[label]))
         at = part.stop
         if label not in one.causes:
             continue
@@ -193,7 +193,7 @@ def practical_kind(table: Hypotheses, one: Hypothesis) -> str:
     if one.kind not in (NOMINAL, RAISED, INTERMITTENT) or device(one, table.parts.pattern):
         return one.kind
     acceleration = table.trial.reference.process_noise.acceleration
-    factor = one.remainder.factor_with_force(one.found.noise_factor, acceleration)
+    factor = one.remainder.factor_with_force(one.estimate.noise_factor, acceleration)
     ordinary = thresholds.ORDINARY_NOISE if table.parts.ordinary_noise else 1.0
     if table.parts.ordinary_spreads:
         spread = thresholds.ORDINARY_SPREADS * table.trial.nominal_spread

@@ -120,7 +120,7 @@ def _unproved(
     )
 
 
-def judged(
+def judge(
     search: Search, held: Judge | None
 ) -> tuple[Decision, Posterior, Gain | None, dict[str, str]]:
     """The decision that held-out voyages leave, its posterior and gain, and name → why refuted.

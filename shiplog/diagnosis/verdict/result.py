@@ -10,7 +10,7 @@ import numpy as np
 
 from shiplog.diagnosis.hypotheses.evaluate import resume
 from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
-from shiplog.diagnosis.trial.fitted import ExpectedEvidence, Fit, Found, Start
+from shiplog.diagnosis.trial.fitted import Estimate, ExpectedEvidence, Fit, Start
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.models.causes import Cause, ParameterEstimate
 
@@ -90,9 +90,9 @@ class Decision:
     @property
     def unnamed(self) -> Decision:
         """The same with nothing named, and the process noise as it is reported."""
-        noise_factor = self.fit.found.noise_factor
-        nothing = replace(self.nothing.found, noise_factor=noise_factor)
-        return replace(self, named=(), one_of=(), fit=replace(self.nothing, found=nothing))
+        noise_factor = self.fit.estimate.noise_factor
+        nothing = replace(self.nothing.estimate, noise_factor=noise_factor)
+        return replace(self, named=(), one_of=(), fit=replace(self.nothing, estimate=nothing))
 
 
 def without_cause(trial: Trial, decision: Decision, one: Named) -> Decision:
@@ -102,18 +102,18 @@ def without_cause(trial: Trial, decision: Decision, one: Named) -> Decision:
     labels = tuple(n for n in fit.included if n != one.cause.label)
     again = decision.nothing
     if labels:
-        numbers = {n: fit.found.numbers[n] for n in labels}
+        numbers = {n: fit.estimate.numbers[n] for n in labels}
         less = resume(trial, labels, remainder, Start(numbers, fit.point.path))
-        if less.found.covariance is None:  # the fit diverged: it has no numbers
+        if less.estimate.covariance is None:  # the fit diverged: it has no numbers
             named = ()
         else:
             again = less
-    kept = _fitted_again(again.found, named)
+    kept = _fitted_again(again.estimate, named)
     verdict = "named" if kept or decision.side_force else "none"
     return replace(decision, named=kept, verdict=verdict, fit=again)
 
 
-def _fitted_again(found: Found, named: Sequence[Named]) -> tuple[Named, ...]:
+def _fitted_again(found: Estimate, named: Sequence[Named]) -> tuple[Named, ...]:
     """The named causes that a hypothesis holds, in its order, with its numbers."""
     again, end, by = [], 0, {n.cause.label: n for n in named}
     for label, values in found.numbers.items():

@@ -83,19 +83,13 @@ class Tried:
     there: float | None = None
 
 
-def best(simulator: ExtendedSimulator, cut: Windows) -> tuple[str, float]:
-    """argmin over conventions of mean L on these windows, in words, and that L. A window in which
-    the model diverges has an L of RUNAWAY."""
-    found = try_conventions(simulator, cut)
-    return found.words, found.loss
-
-
 def try_conventions(
     simulator: ExtendedSimulator, cut: Windows, nominal: Windows | None = None,
     read_as: Profile | None = None,
 ) -> Tried:  # fmt: skip
-    """As `best`: argmin of h L max(L_hold/L_hold', 1), with L_hold of constant velocities as the
-    windows are and L_hold' under the convention, and a handicap h (NEARLY, UNSTATED, else 1).
+    """argmin over conventions of h L max(L_hold/L_hold', 1), with the mean L on these windows
+    (RUNAWAY of one in which the model diverges), L_hold of constant velocities as the windows are
+    and L_hold' under the convention, and a handicap h (NEARLY, UNSTATED, else 1).
     Where nominal windows are given, conventions that these show as well (L'/L ≤ THERE_TOO) are left
     out: their model has them, too.
 
@@ -134,20 +128,14 @@ def _hold(cut: Windows) -> float:
     return float(parts(cut.state[:, :1] - cut.state, cut.dt).sum(1).mean()) if len(cut) else 0.0
 
 
-def windows_under_conventions(profile: Profile, cut: Windows) -> Iterator[tuple[str, Windows]]:
-    """Each convention in words, and the windows under it."""
-    for one in conventions(profile, cut):
-        yield one.words, one.windows
-
-
 def conventions(profile: Profile, cut: Windows, read_as: Profile | None = None) -> Iterator[Turned]:
     """Signs of actuators of a kind, twins exchanged, their units; the wind's direction and unit;
     heading, yaw rate and velocity. read_as   as `try_conventions` has it"""
-    yield from _of_actuators(profile, cut, read_as)
+    yield from _actuator_signs(profile, cut, read_as)
     if cut.wind.shape[-1]:
-        yield from _of_wind(cut, read_as)
+        yield from _wind_signs(cut, read_as)
     if getattr(profile, "sensors", None) is not None:
-        yield from _of_motion(profile, cut, read_as)
+        yield from _motion_signs(profile, cut, read_as)
 
 
 def _stated(words: str, read_as: Profile | None, name: str, kind: str = "") -> bool:
@@ -162,7 +150,7 @@ def _stated(words: str, read_as: Profile | None, name: str, kind: str = "") -> b
     return any(words.endswith(f"called {SPOKEN.get(unit, unit)}") for unit in units)
 
 
-def _of_actuators(profile: Profile, cut: Windows, read_as: Profile | None) -> Iterator[Turned]:
+def _actuator_signs(profile: Profile, cut: Windows, read_as: Profile | None) -> Iterator[Turned]:
     actuators = profile.actuators
     for kind in dict.fromkeys(a.kind for a in actuators):
         columns = [i for i, a in enumerate(actuators) if a.kind == kind]
@@ -190,7 +178,7 @@ def _of_actuators(profile: Profile, cut: Windows, read_as: Profile | None) -> It
             )  # fmt: skip
 
 
-def _of_wind(cut: Windows, read_as: Profile | None) -> Iterator[Turned]:
+def _wind_signs(cut: Windows, read_as: Profile | None) -> Iterator[Turned]:
     """γ + π, -γ, γ ± π/2, γ - ψ of the wind's angle γ; its speed over each factor of SPEEDS."""
     key = "[sensors.wind]"
     yield Turned(
@@ -219,9 +207,9 @@ def _of_wind(cut: Windows, read_as: Profile | None) -> Iterator[Turned]:
         )  # fmt: skip
 
 
-def _of_motion(profile: Profile, cut: Windows, read_as: Profile | None) -> Iterator[Turned]:
+def _motion_signs(profile: Profile, cut: Windows, read_as: Profile | None) -> Iterator[Turned]:
     """-ψ, π/2 - ψ, ψ + π/2, ψ + π of the heading ψ, and ψ over each factor of ANGLES; -r and r over
-    each of RATES; then `_of_velocity`."""
+    each of RATES; then `_velocity_signs`."""
     record = as_record(cut, profile, {}, {})
     seen = record.sighted
 
@@ -271,10 +259,10 @@ def _of_motion(profile: Profile, cut: Windows, read_as: Profile | None) -> Itera
                 lambda s, f=factor: replace(s, yaw_rate=rate / f),
                 _stated(words, read_as, "yaw_rate"),
             )  # fmt: skip
-    yield from _of_velocity(read, seen, cut, over_ground, read_as)
+    yield from _velocity_signs(read, seen, cut, over_ground, read_as)
 
 
-def _of_velocity(
+def _velocity_signs(
     read: Callable[..., Turned],
     seen: Sighted,
     cut: Windows,

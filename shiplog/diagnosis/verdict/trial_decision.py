@@ -81,7 +81,7 @@ def decide_trial(
         judge = HeldOut(cut, trial_voyages.simulator(run, trial), trial, None, before, read_as)
     reach("held-out voyages")
     refutes = judge if parts.refutation else None
-    decision, _, gain, refuted = refutation.judged(found.search, refutes)
+    decision, _, gain, refuted = refutation.judge(found.search, refutes)
     if refutes is None and judge is not None and decision.named:
         gain = judge.gain(decision)
     return Decided(trial, found.untested, found.point, judge, decision, gain, refuted)
@@ -101,7 +101,8 @@ class _Searched:
         """Label → numbers of the causes that would be named, whatever held-out voyages say."""
         decision, _ = decide(self.search)
         return {
-            one.cause.label: decision.fit.found.numbers[one.cause.label] for one in decision.named
+            one.cause.label: decision.fit.estimate.numbers[one.cause.label]
+            for one in decision.named
         }
 
 

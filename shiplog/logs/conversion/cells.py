@@ -77,7 +77,7 @@ def _short(word: str) -> str:
     return repr(word if len(word) <= 40 else word[:40] + "...")
 
 
-def without(values: pl.Series, missing: Sequence[float | str]) -> pl.Series:
+def drop_missing(values: pl.Series, missing: Sequence[float | str]) -> pl.Series:
     """A column without the values that stand for none."""
     stands = pl.Series([False]).new_from_index(0, len(values))
     if values.dtype == pl.Boolean:
@@ -97,7 +97,7 @@ def without(values: pl.Series, missing: Sequence[float | str]) -> pl.Series:
 
 def holds(values: pl.Series, marks: Sequence[float | str]) -> pl.Series:
     """Whether a row's value [bool] is one of some, as numbers or as words."""
-    return values.is_not_null() & without(values, marks).is_null()
+    return values.is_not_null() & drop_missing(values, marks).is_null()
 
 
 def _numbers(texts: pl.Series, column: Column) -> pl.Series:

@@ -15,7 +15,7 @@ import polars as pl
 from shiplog.exceptions import ChannelMissing, ProfileError, listed, nearest
 from shiplog.logs.conversion import cells, clock
 from shiplog.logs.conversion.delimited import DelimitedTable
-from shiplog.logs.conversion.steps_back import along
+from shiplog.logs.conversion.steps_back import explain_steps
 from shiplog.logs.conversion.write import SCHEMAS, Series
 from shiplog.logs.health.dates import UNDATED
 from shiplog.logs.health.health_report import Finding
@@ -76,7 +76,7 @@ def voyages(
     refuse_scaled(present, profile)
     refuse_undecided({n: table.undecided[n] for n in present if n in table.undecided}, path)
     frame = frame.with_columns(
-        cells.without(frame[name], column.missing)
+        cells.drop_missing(frame[name], column.missing)
         for name, column in present.items() if column.missing and column.channel != "status"
     )  # fmt: skip
     frame = _of_one_vessel(frame, present, profile, path)
@@ -122,7 +122,7 @@ def _in_order(
     for name, part in parts:
         rows = part.drop("voyage", strict=False)
         filled = rows.select(pl.exclude("time").is_not_null())
-        course = along(
+        course = explain_steps(
             rows["time"].to_numpy(), filled.hash_rows().to_numpy() if filled.width else None
         )
         rows = rows.with_columns(time=pl.Series(course.time))

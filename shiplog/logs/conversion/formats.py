@@ -18,10 +18,10 @@ FORMATS = (
 )
 
 
-def of(path: Path) -> Format:
+def recognise(path: Path) -> Format:
     return next(one for one in FORMATS if one.takes(path))
 
 
 def convertible(path: Path, profile: Profile | None) -> bool:
     """Whether logs can be made of it; the reader of logs says what is wrong with the others."""
-    return of(path).sure(path, profile)
+    return recognise(path).sure(path, profile)

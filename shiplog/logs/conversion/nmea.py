@@ -71,19 +71,10 @@ def is_nmea(path: Path) -> bool:
     return bool(filled) and sentences >= SENTENCE_SHARE * len(filled)
 
 
-def read_nmea(path: Path) -> tuple[list[Series], int]:
-    """An NMEA log as topics, and how many of its sentences were damaged.
-
-    Raises ChannelMissing where no sentence says anything of a ship, or none has a time.
-    """
-    found = read_nmea_log([path], path.name)
-    return found.series, found.damaged
-
-
 def read_nmea_log(paths: Sequence[Path], name: str) -> NmeaLog:
     """One log of a text, or of several that one recorder wrote, an instrument each.
 
-    Raises ChannelMissing as `read_nmea` does."""
+    Raises ChannelMissing where no sentence says anything of a ship, or none has a time."""
     if len(paths) == 1:
         return read_sentences(_text(paths[0]), name)
     reader = _Reader()
@@ -98,7 +89,7 @@ def lines_to_series(lines: Iterable[str], name: str, received: Sequence[int]) ->
     """Sentences with the recorder's time [ns] of each, as topics. Raises ChannelMissing."""
     reader, read = _Reader(), Lines()
     for line, stamp in zip(lines, received, strict=True):
-        for sentence in read.of(line, stamp):
+        for sentence in read.accept(line, stamp):
             reader.take(sentence)
     return reader.finish(name, [read]).series
 
@@ -107,7 +98,7 @@ def read_sentences(lines: Iterable[str], name: str) -> NmeaLog:
     """The same of lines. Raises ChannelMissing."""
     reader, read = _Reader(), Lines()
     for line in lines:
-        for sentence in read.of(line):
+        for sentence in read.accept(line):
             reader.take(sentence)
     return reader.finish(name, [read])
 
@@ -138,7 +129,7 @@ def _stamped(lines: Lines, path: Path) -> Iterator[tuple[int, Sentence]]:
     """The sentences of a file, each with the last receive stamp before it [ns]."""
     last = -1
     for line in _text(path):
-        for sentence in lines.of(line):
+        for sentence in lines.accept(line):
             last = max(last, sentence.received)
             yield last, sentence
 

@@ -78,7 +78,7 @@ class Clock:
             by_stamp = self._epochs(place)
         else:
             by_stamp = self.corrected[place]
-        return np.where(own >= 0, own, np.where(stamped, by_stamp, self._between(place)))
+        return np.where(own >= 0, own, np.where(stamped, by_stamp, self._spread_times(place)))
 
     def _rides(self, place: np.ndarray) -> bool:
         """Whether an instrument's sentences come in the bursts that hold a UTC."""
@@ -94,7 +94,7 @@ class Clock:
         by_late = self.spread[place] - self.late[place]
         return np.where(shared & alone, self.known[of_burst], by_late)
 
-    def _between(self, place: np.ndarray) -> np.ndarray:
+    def _spread_times(self, place: np.ndarray) -> np.ndarray:
         """Times [k] ns: spread evenly over the time from the UTC before them to the next. -1 before
         the first UTC."""
         if not len(self.known):

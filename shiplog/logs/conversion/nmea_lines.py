@@ -111,7 +111,7 @@ class Lines:
         self.damaged = 0
         self.unused: Counter[str] = Counter()  # a maker's own, by his letters
 
-    def of(self, line: str, received: int | None = None) -> list[Sentence]:
+    def accept(self, line: str, received: int | None = None) -> list[Sentence]:
         """The sentences of a line whose checksums do not speak against them.
 
         received  ns, where the recorder's time is known otherwise than by the line

@@ -232,7 +232,7 @@ def _parts(
     for number in np.unique(of).tolist():
         at = np.flatnonzero(of == number)
         time = clock.times(place[at])
-        keep, time = _apart(time, clock.utc[place[at]] >= 0, values[at])
+        keep, time = _separate_times(time, clock.utc[place[at]] >= 0, values[at])
         spoken.repeated[rows.kind] += int((~keep).sum())
         known = keep & (time >= 0)
         spoken.dropped[rows.kind] += int((keep & (time < 0)).sum())
@@ -243,7 +243,9 @@ def _parts(
     return parts
 
 
-def _apart(time: np.ndarray, own: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _separate_times(
+    time: np.ndarray, own: np.ndarray, values: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Which rows [n] are kept, and times [n] ns of which no two are the same.
 
     Sentences of one UTC, which counts in whole or tens of seconds, lie between it and the next. If

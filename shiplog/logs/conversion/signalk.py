@@ -98,10 +98,10 @@ def is_signalk(path: Path) -> bool:
     with path.open("rb") as stream:
         start = stream.read(LOOKED_AT_BYTES).decode("utf-8", "replace")
     lines = [line for line in start.splitlines()[:LOOKED_AT_LINES] if line.strip()]
-    return bool(lines) and sum(map(_known, lines)) >= LINE_SHARE * len(lines)
+    return bool(lines) and sum(map(_is_known, lines)) >= LINE_SHARE * len(lines)
 
 
-def _known(line: str) -> bool:
+def _is_known(line: str) -> bool:
     split = MULTIPLEXED.match(line)
     if not split:
         return bool(DELTA.match(line))

@@ -45,7 +45,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Along:
+class ExplainedTimes:
     """A clock along the rows of a table.
 
     time      [n] ns, in the order of the rows, counted on where a count began anew
@@ -68,7 +68,7 @@ class _Course:
     starts: list[tuple[int, int]] = field(default_factory=list)  # first row and step back [ns]
 
 
-def along(time: np.ndarray, kind: np.ndarray | None = None) -> Along:
+def explain_steps(time: np.ndarray, kind: np.ndarray | None = None) -> ExplainedTimes:
     """The times of a table's rows, each step back explained.
 
     time    [n] ns, in the order of the file
@@ -79,20 +79,22 @@ def along(time: np.ndarray, kind: np.ndarray | None = None) -> Along:
     time = np.asarray(time, np.int64)
     step = np.diff(time)
     if len(time) < 3 or not ((step < 0).any() or (step >= HOUR_NS).any()):
-        return Along(time, np.zeros(len(time), np.int64))
+        return ExplainedTimes(time, np.zeros(len(time), np.int64))
     if (step < 0).sum() > BACKWARDS * (step != 0).sum():
-        turned = along(time[::-1], None if kind is None else kind[::-1])
-        return Along(turned.time[::-1], turned.part.max() - turned.part[::-1], turned.findings)
+        turned = explain_steps(time[::-1], None if kind is None else kind[::-1])
+        return ExplainedTimes(
+            turned.time[::-1], turned.part.max() - turned.part[::-1], turned.findings
+        )
     ahead = step[step > 0]
     usual = float(np.median(ahead)) if len(ahead) else 0.0
     breaks = _breaks(time, step, usual)
     back = [row for row in breaks if step[row] < 0]
     if len(back) > max(MOST_PARTS, DISORDER * len(time)):  # shuffled, or a block each instrument
-        return Along(time, np.zeros(len(time), np.int64))
+        return ExplainedTimes(time, np.zeros(len(time), np.int64))
     course = _Course(time.copy(), np.zeros(len(time), np.int64))
     kind = np.zeros(len(time), np.int64) if kind is None else np.asarray(kind)
     _follow(course, breaks, usual, kind)
-    return Along(course.time, course.part, tuple(_findings(course)))
+    return ExplainedTimes(course.time, course.part, tuple(_findings(course)))
 
 
 def _breaks(time: np.ndarray, step: np.ndarray, usual: float) -> list[int]:
@@ -117,7 +119,7 @@ def _follow(course: _Course, breaks: list[int], usual: float, kind: np.ndarray) 
         end = breaks[number + 1] + 1 if number + 1 < len(breaks) else len(raw)
         step = int(raw[row + 1] - raw[row])
         if step > 0:
-            _ahead(course, added, raw, row, usual, breaks, number)
+            _explain_step_ahead(course, added, raw, row, usual, breaks, number)
             continue
         name, size = _count(int(raw[row]), int(raw[row + 1]), usual, dated)
         if size:
@@ -137,7 +139,7 @@ def _follow(course: _Course, breaks: list[int], usual: float, kind: np.ndarray) 
                 )
 
 
-def _ahead(
+def _explain_step_ahead(
     course: _Course, added: list[tuple[str, int]], raw: np.ndarray, row: int, usual: float,
     breaks: list[int], number: int,
 ) -> None:  # fmt: skip
@@ -258,7 +260,7 @@ def of_one_recording(time: pl.Series, where: str) -> pl.Series:
     be cut at the same moment.
     """
     known = time.is_not_null().to_numpy()
-    course = along(time.filter(time.is_not_null()).to_numpy())
+    course = explain_steps(time.filter(time.is_not_null()).to_numpy())
     for part, finding in course.findings:
         if part is not None:
             raise ProfileError(

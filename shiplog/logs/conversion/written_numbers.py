@@ -7,14 +7,11 @@ as its own values say, else as the other columns of the file do, else it is aske
 
 from __future__ import annotations
 
-import logging
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import polars as pl
-
-log = logging.getLogger(__name__)
 
 SAMPLE = 1_000  # values of a column that mostly say how it is written
 MOSTLY = 0.5  # share of a column's values that are numbers: it is then no column of words

@@ -33,7 +33,7 @@ class Json:
     ) -> tuple[pl.DataFrame, np.ndarray]:
         bad = np.zeros(len(payloads), np.bool_)
         if any(len(payload) > 2 * DEEPEST for payload in payloads):  # as one so deep has to be
-            payloads = [b"" if _beyond(payload) else payload for payload in payloads]
+            payloads = [b"" if _is_too_deep(payload) else payload for payload in payloads]
         text = b"\n".join(
             p.replace(b"\n", b" ").replace(b"\r", b" ") if b"\n" in p or b"\r" in p else p
             for p in payloads
@@ -72,7 +72,7 @@ class Json:
         return pl.DataFrame([_column(name, [row.get(name) for row in rows]) for name in names])
 
 
-def _beyond(payload: bytes) -> bool:
+def _is_too_deep(payload: bytes) -> bool:
     """Whether a message goes deeper, or has more fields, than any does."""
     if len(payload) <= 2 * DEEPEST:
         return False

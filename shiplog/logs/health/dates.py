@@ -80,11 +80,11 @@ def impossible(
             without.append(topic)
         for clock in faulty if known else ():
             groups.setdefault((clock, *known[0]), []).append(topic)
-    findings = [_against(*of, topics, frames) for of, topics in sorted(groups.items())]
+    findings = [_compare(*of, topics, frames) for of, topics in sorted(groups.items())]
     return findings + ([_none_right(without, frames)] if without else [])
 
 
-def _against(
+def _compare(
     clock: str, right: str, day: str, topics: list[str], frames: Mapping[str, pl.DataFrame]
 ) -> Finding:
     ahead = pl.concat([frames[t].select(pl.col(clock) - pl.col(right)) for t in topics])

@@ -34,6 +34,6 @@ def beginnings(stream: IO[bytes], start: int, limit: int) -> Iterator[tuple[int,
         start += LOOKED
 
 
-def within(places: list[int], start: int, end: int) -> list[int]:
+def select_range(places: list[int], start: int, end: int) -> list[int]:
     """Those of sorted places in [start, end)."""
     return places[bisect_left(places, start) : bisect_left(places, end)]

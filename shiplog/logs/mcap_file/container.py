@@ -7,7 +7,6 @@ that a CRC vouches for is taken.
 
 from __future__ import annotations
 
-import logging
 import struct
 import zlib
 from collections.abc import Iterator
@@ -32,8 +31,6 @@ from mcap.records import (
 from shiplog.logs.mcap_file import records
 from shiplog.logs.mcap_file.records import HEAD, parsed
 from shiplog.logs.mcap_file.refusals import MAGIC
-
-log = logging.getLogger(__name__)
 
 FOOTER = struct.Struct("<QQI")
 INDEXED = struct.Struct("<QQQQ")  # of a chunk's index: times, where it stands, bytes of its record

@@ -338,8 +338,8 @@ class _Walk:
         """Where the next chunk, message or log begins that can be read, from `start` on; before
         `end`, where one is given."""
         end = self.found.end if end is None else min(end, self.found.end)
-        limit = next(filter(self._indexed, beginnings.within(self.starts, start, end)), end)
-        limit = next(filter(self._hinted, beginnings.within(self.hints, start, limit)), limit)
+        limit = next(filter(self._indexed, beginnings.select_range(self.starts, start, end)), end)
+        limit = next(filter(self._hinted, beginnings.select_range(self.hints, start, limit)), limit)
         for at, kind in beginnings.beginnings(self.stream, start, limit):
             if kind == Opcode.CHUNK and self._checked(at):
                 return at

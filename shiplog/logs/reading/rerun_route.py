@@ -13,18 +13,19 @@ import contextlib
 import json
 import logging
 import os
-import subprocess
-import sys
 import threading
 from collections import Counter
 from collections.abc import Collection
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
 from shiplog.logs.decoding.tables import Tables, Tally
-from shiplog.machine import files, reading_limits
+from shiplog.machine import child, files, limits, reading_limits
+
+if TYPE_CHECKING:
+    import subprocess
 
 log = logging.getLogger(__name__)
 
@@ -64,8 +65,8 @@ def read_most(tables: Tables, tally: Tally, filled: Collection[str] = ()) -> set
     with files.temporary_folder() as folder:
         seconds = START_TIMEOUT_S + sum(expected.values()) / PACE
         request = {"log": str(tables.found.path.resolve()), "folder": str(folder), "topics": asked}
-        limits = {"seconds": seconds, "bytes": reading_limits.memory(tables.found.size)}
-        rows = worker().ask(request | limits, seconds).get("rows", [])
+        most = {"seconds": seconds, "bytes": reading_limits.memory(tables.found.size)}
+        rows = worker().ask(request | most, seconds).get("rows", [])
         for number, (topic, got) in enumerate(zip(asked, rows, strict=False)):
             if got == expected[topic] and _take(tables, topic, folder / f"{number}.arrow"):
                 done.add(topic)
@@ -151,24 +152,19 @@ class Worker:
     def ask(self, request: dict[str, Any], seconds: float) -> dict[str, Any]:
         """Its answer; nothing when it died, or had to be ended after these seconds."""
         with self._lock:
-            patience: threading.Timer | None = None
             try:
                 process = self._running()
                 assert process.stdin and process.stdout
-                patience = threading.Timer(seconds, process.kill)
-                patience.start()
-                process.stdin.write(json.dumps(request) + "\n")
-                process.stdin.flush()
-                reply = json.loads(process.stdout.readline())
+                with child.patience(process, seconds):
+                    process.stdin.write(json.dumps(request) + "\n")
+                    process.stdin.flush()
+                    reply = json.loads(process.stdout.readline())
             except (OSError, ValueError):
                 self._stop()
                 return {}
             except BaseException:  # an answer that nobody waited for must not meet the next request
                 self._stop()
                 raise
-            finally:
-                if patience is not None:
-                    patience.cancel()
         if "error" in reply:
             log.info("Rerun: %s", reply["error"])
         return reply
@@ -185,28 +181,16 @@ class Worker:
     def _running(self) -> subprocess.Popen[str]:
         if self._process is None or not self.runs:
             self._stop()
-            alone = [sys.executable, "-P", str(WORKER)]  # its folder not on the path: no clash
-            with reading_limits.lifted():
-                self._process = subprocess.Popen(
-                    alone,
-                    stdin=subprocess.PIPE,
-                    stdout=subprocess.PIPE,
-                    stderr=subprocess.DEVNULL,
-                    text=True,
-                    encoding="utf-8",
-                )
+            with limits.lifted():
+                self._process = child.script(WORKER)
         return self._process
 
     def _stop(self) -> None:
         process, self._process = self._process, None
         if process is None:
             return
-        process.kill()
-        process.wait()
+        child.stop(process, patience_s=0.0)
         log.debug("Rerun's process ended with %d", process.returncode)
-        for pipe in (process.stdin, process.stdout):
-            with contextlib.suppress(OSError):
-                pipe.close()  # type: ignore[union-attr]
 
 
 _workers: dict[int, Worker] = {}  # by process: one that forks leaves its own alone

@@ -22,6 +22,10 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from rerun.chunk import McapReader
 
+sys.path.append(str(Path(__file__).parents[3]))  # last: as the script that started it finds shiplog
+
+from shiplog.machine import child, limits
+
 DECODERS = ["protobuf", "ros2_reflection"]  # the lossless ones: the others reshape what they know
 RECORDER_TIMES = ("log_time", "publish_time")
 
@@ -71,26 +75,13 @@ def columns(batch: pa.RecordBatch, fields: Sequence[str]) -> pa.RecordBatch | No
     return pa.RecordBatch.from_pydict(made)
 
 
-def limit(memory: int) -> None:
-    """Bytes beyond what Rerun has reserved already, 2 GB on two cores."""
-    if sys.platform != "linux":
-        return
-    import resource
-
-    pages = int(Path("/proc/self/statm").read_text().split()[5])  # of data and stacks
-    most = pages * resource.getpagesize() + memory
-    hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
-    most = most if hard == resource.RLIM_INFINITY else min(most, hard)
-    resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
-
-
 def main() -> None:
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)  # whatever else prints must not stand between the answers
-    for line in sys.stdin:
+    for line in child.requests():
         asked = json.loads(line)
         faulthandler.dump_traceback_later(asked["seconds"], exit=True)  # also when nobody waits
-        limit(asked["bytes"])
+        limits.set_limits(limits.reserved() + asked["bytes"])  # Rerun itself has 2 GB on two cores
         try:
             reply = {"rows": extract(asked["log"], Path(asked["folder"]), asked["topics"])}
         except Exception as error:

@@ -31,7 +31,7 @@ def messages(found: Survey) -> Iterator[list[Message]]:
     """The messages of each sound chunk in batches, or each message that stands alone; none of a
     chunk that holds more than the whole log can."""
     for item in scan.walk(found):
-        if not isinstance(item, Index) and not _beyond(item, room(found)):
+        if not isinstance(item, Index) and not _overfull(item, room(found)):
             yield from filter(None, sound_messages.messages_of(found, item))
 
 
@@ -43,7 +43,7 @@ def read_all(tables: Tables, topics: Collection[str] | None = None) -> Tally:
     for item in scan.walk(tables.found):
         if isinstance(item, Index):
             continue
-        if left_out := _beyond(item, tables.room):
+        if left_out := _overfull(item, tables.room):
             _count(tables, topics, left_out, tally)
             continue
         for met in sound_messages.messages_of(tables.found, item):
@@ -57,7 +57,7 @@ def read_all(tables: Tables, topics: Collection[str] | None = None) -> Tally:
     return tally
 
 
-def _beyond(item: Sound | Alone, most: int) -> Counter[int]:
+def _overfull(item: Sound | Alone, most: int) -> Counter[int]:
     """The messages by channel of a chunk that holds more than so many; else nothing.
 
     They are counted and not made; every description of a channel is known by now.

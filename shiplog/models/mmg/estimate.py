@@ -107,7 +107,7 @@ def _afloat(
     box = density * length * breadth * draught
     if block is None and mass is not None:
         found = mass / box
-        block = _within(found, *BLOCK_COEFFICIENTS)
+        block = _clip(found, *BLOCK_COEFFICIENTS)
         limited = "" if block == found else f", limited from {found:.2g}"
         notes.append(f"block coefficient {block:.2g} estimated from the mass{limited}")
     elif block is None:
@@ -171,7 +171,7 @@ def inertia_spread(p: Particulars) -> dict[str, float]:
         "m_y": 2.0 * strip,
         "i_j": (0.25**2 + (0.4 * ratio) ** 2) * p.mass_nd + 2.0 * strip / 12.0,
     }
-    broad = _within((ratio - BROADEST) / BROADEST, 0.0, 1.0)
+    broad = _clip((ratio - BROADEST) / BROADEST, 0.0, 1.0)
     return {key: 0.5 * broad * max(twin[key] - known[key], 0.0) for key in twin}
 
 
@@ -242,10 +242,10 @@ def rudder(p: Particulars, area: float, span: float) -> dict[str, float]:
     2015); k_xr/k_x and c_PR the Esso Osaka's.
     """
     aspect = span**2 / area
-    straightening = _within(2.06 * p.fullness + 0.14, 0.1, 1.0)
+    straightening = _clip(2.06 * p.fullness + 0.14, 0.1, 1.0)
     return {
-        "t_r": _within(1.0 - (0.28 * p.block + 0.55), 0.0, 0.5),
-        "a_h": _within(0.627 * p.block - 0.153, 0.0, 1.0),
+        "t_r": _clip(1.0 - (0.28 * p.block + 0.55), 0.0, 0.5),
+        "a_h": _clip(0.627 * p.block - 0.153, 0.0, 1.0),
         "x_h": -0.45,
         "l_r": -0.9,
         "k_x": 0.55,
@@ -279,7 +279,7 @@ def wind(p: Particulars) -> dict[str, float]:
         breadth=breadth,
     )
     limits = {"x1": (-1.5, -0.3), "y1": (0.5, 1.4)}
-    return {key: _within(value, *limits.get(key, (-0.3, 0.3))) for key, value in found.items()}
+    return {key: _clip(value, *limits.get(key, (-0.3, 0.3))) for key, value in found.items()}
 
 
 def fujiwara(
@@ -348,5 +348,5 @@ def _sum(coefficients: tuple[float, ...], *ratios: float) -> float:
     return sum(c * r for c, r in zip(coefficients, (1.0, *ratios), strict=True))
 
 
-def _within(value: float, low: float, high: float) -> float:
+def _clip(value: float, low: float, high: float) -> float:
     return min(max(value, low), high)

@@ -66,7 +66,7 @@ def _residual(done: Diagnosis) -> tuple[pl.DataFrame, tuple[str, ...]]:
     nothing = decision.nothing
     nominal = ref.mean * ref.columns.unit
     process_noise = trial.process_noise(nothing.remainder, whole.cut)
-    process_noise = process_noise.times(nothing.found.noise_factor)
+    process_noise = process_noise.times(nothing.estimate.noise_factor)
     residual = trial.less_misfit(whole, nominal)
     found = residual_acceleration.posterior(*residual, process_noise, record)
     keep = residual_acceleration.unique_instants(found)

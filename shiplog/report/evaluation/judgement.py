@@ -135,7 +135,7 @@ def _median(values: pl.Series) -> float:
 def force_line(forces: pl.DataFrame, voyage: str) -> str:
     """Root mean square of every part of the force along one voyage, largest first.
 
-    forces   of `forces.along`
+    forces   of `force_breakdown.break_down`
     """
     own = forces.filter(pl.col("voyage") == voyage, pl.col("part") != "total")
     size = (pl.col("surge").pow(2) + pl.col("sway").pow(2)).mean().sqrt()

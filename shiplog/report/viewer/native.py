@@ -20,29 +20,13 @@ from pathlib import Path
 from typing import IO
 
 from shiplog.exceptions import ShiplogError
+from shiplog.machine import child
 
 HOST = "127.0.0.1"
 RERUN = f"rerun --bind {HOST}"  # as a user starts it: alone, it listens on every interface
 WITHOUT_A_WINDOW = "use --save FILE.rrd to keep the recording, or --web to look at it in a browser."
 NATIVE_PATIENCE = 2.0  # s: a viewer that has no graphics says so at once
 WEB_PATIENCE = 30.0  # s: the first start on a slow disk
-
-
-# A server without a command is a third of a core until the machine is switched off. Whatever ends
-# this process closes the pipe that this one reads, SIGKILL included, on every system.
-SUPERVISOR = """
-import subprocess, sys, threading
-server = subprocess.Popen(sys.argv[1:], stdin=subprocess.DEVNULL)
-def end():
-    sys.stdin.buffer.read()
-    server.terminate()
-    try:
-        server.wait(4.0)
-    except subprocess.TimeoutExpired:
-        server.kill()
-threading.Thread(target=end, daemon=True).start()
-sys.exit(server.wait())
-"""
 
 
 def open_viewer(path: str | Path) -> None:
@@ -55,7 +39,7 @@ def open_viewer(path: str | Path) -> None:
         with contextlib.suppress(subprocess.TimeoutExpired):
             if viewer.wait(NATIVE_PATIENCE) != 0:
                 raise ShiplogError(
-                    f"The viewer did not start: {last_words(output)}", hint=WITHOUT_A_WINDOW
+                    f"The viewer did not start: {child.last_words(output)}", hint=WITHOUT_A_WINDOW
                 )
 
 
@@ -75,7 +59,7 @@ class Served:
             self.stop()
 
     def stop(self) -> None:
-        stop(self.process)
+        child.stop(self.process)
 
     def __enter__(self) -> Served:
         return self
@@ -95,41 +79,22 @@ def serve(path: str | Path, port: int = 9090) -> Served:
         try:
             wait_for(process, (web, data), WEB_PATIENCE)
         except TimeoutError:
-            stop(process)
+            child.stop(process)
             raise ShiplogError(
-                f"The web viewer did not start: {last_words(output)}",
+                f"The web viewer did not start: {child.last_words(output)}",
                 hint=f"use --save FILE.rrd, and open the file with `{RERUN} FILE.rrd`.",
             ) from None
     return Served(f"http://{HOST}:{web}/?url={source}", process)
 
 
 def start(arguments: list[str], output: IO[bytes], supervised: bool = False) -> subprocess.Popen:
-    """Start Rerun's program in a group of its own, so that Ctrl-C here does not close a window.
+    """Start Rerun's program, listening on this machine only.
 
-    supervised   it ends when this process ends, however that comes about
+    supervised   it ends when this process ends: a server without a command is a third of a core
+                 until the machine is switched off
     """
     command = [str(_program()), *arguments, "--bind", HOST]
-    return subprocess.Popen(
-        [sys.executable, "-I", "-c", SUPERVISOR, *command] if supervised else command,
-        env=_environment(),
-        stdin=subprocess.PIPE if supervised else subprocess.DEVNULL,
-        stdout=output,
-        stderr=subprocess.STDOUT,
-        start_new_session=True,
-    )
-
-
-def stop(process: subprocess.Popen) -> None:
-    """End it, at first politely."""
-    if process.stdin is not None:
-        process.stdin.close()  # its supervisor ends it
-    else:
-        process.terminate()
-    try:
-        process.wait(5.0)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
+    return child.program(command, output, _environment(), supervised)
 
 
 def free_port(wanted: int = 0) -> int:
@@ -184,10 +149,3 @@ def existing(path: str | Path) -> Path:
     if not path.is_file():
         raise ShiplogError(f"There is no recording {path}.", hint="save one with --save FILE.rrd.")
     return path
-
-
-def last_words(output: IO[bytes]) -> str:
-    """The program's last line, for a message."""
-    output.seek(0)
-    lines = [line for line in output.read().decode(errors="replace").splitlines() if line.strip()]
-    return lines[-1].strip()[:300] if lines else "it gave no message."

@@ -11,6 +11,7 @@ from pathlib import Path
 from rerun.experimental import ViewerClient, ViewerState
 
 from shiplog.exceptions import ShiplogError
+from shiplog.machine import child
 from shiplog.report.viewer import native, style
 
 LOAD_TIMEOUT_S = 30.0  # s
@@ -47,8 +48,8 @@ def headless() -> Iterator[ViewerClient]:
             yield ViewerClient(f"rerun+http://{native.HOST}:{port}/proxy")
         except (TimeoutError, ConnectionError):  # it never listened, or ended when it had to draw
             raise ShiplogError(
-                f"The headless viewer did not start: {native.last_words(output)}",
+                f"The headless viewer did not start: {child.last_words(output)}",
                 hint="it needs a Vulkan driver, such as the package mesa-vulkan-drivers.",
             ) from None
         finally:
-            native.stop(process)
+            child.stop(process)

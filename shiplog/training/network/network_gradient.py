@@ -92,12 +92,12 @@ def by_torch(
     weights: Sequence[Tensor], data: Batch, scaling: Scaling, shape: Shape, gradient: bool = True
 ) -> tuple[float, list[Tensor]]:
     """As `loss_and_gradient`, in torch, back-propagated by hand through time."""
-    loss, gradients = together(weights, data, scaling, shape, gradient)
+    loss, gradients = joint_gradient(weights, data, scaling, shape, gradient)
     return float(loss), gradients
 
 
 @torch.no_grad()
-def together(
+def joint_gradient(
     weights: Sequence[Tensor], data: Batch, scaling: Scaling, shape: Shape, gradient: bool = True
 ) -> tuple[Tensor, list[Tensor]]:
     """Loss and gradient in torch, of one network or of S networks at once.

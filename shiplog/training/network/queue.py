@@ -7,20 +7,17 @@ asked ends the workers.
 from __future__ import annotations
 
 import os
-import signal
-import sys
-import threading
 import time
-from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Generator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from multiprocessing import connection, get_context, parent_process
+from multiprocessing import connection
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
-from types import ModuleType
 from typing import Any
 
 from shiplog.exceptions import ShiplogError
+from shiplog.machine import child
 from shiplog.machine.unexpected import unexpected
 
 REPORT_INTERVAL_S = 0.5  # between two reports of a worker
@@ -123,13 +120,13 @@ def work(tasks: Sequence[Task], workers: int | None = None) -> Generator[Event, 
 
 
 def _hire() -> _Worker:
-    context = get_context("spawn")
-    ours, theirs = context.Pipe()
-    process = context.Process(target=_serve, args=(theirs,), daemon=True)
-    with _one_thread(), _signals_deferred(), _script_hidden():
-        process.start()
-    theirs.close()  # so that a worker's death is the end of the pipe
-    return _Worker(process, ours)
+    """A process for one task at a time.
+
+    One core, one task: numerical libraries of child processes read these at import. Two threads on
+    products this small wait for each other more than they work, and on a busy machine for each
+    other alone.
+    """
+    return _Worker(*child.spawn(_serve, dict.fromkeys(THREADS, "1")))
 
 
 def _give(one: _Worker, task: Task) -> Event:
@@ -146,7 +143,6 @@ def _send(one: _Worker, what: tuple[Callable[..., Any], tuple[Any, ...]] | None)
 
 def _serve(pipe: Connection) -> None:
     """In a worker: tasks until there are none."""
-    _end_with_parent()
     while (given := pipe.recv()) is not None:
         function, arguments = given
         latest = [0.0]
@@ -172,83 +168,7 @@ def _serve(pipe: Connection) -> None:
 
 def _ended(code: int | None) -> str:
     """Why a process is no more."""
-    if code is not None and code < 0:
-        name = signal.Signals(-code).name
+    if name := child.ending_signal(code):
         why = ", perhaps for want of memory" if name == "SIGKILL" else ""
         return f"its process was ended from outside ({name}{why})"
     return f"its process ended by itself (exit code {code})"
-
-
-def _end_with_parent() -> None:
-    """Whatever ends the command ends this too, and Ctrl-C is the command's to handle."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = parent_process()
-
-    def wait() -> None:
-        if parent is not None:
-            parent.join()
-            os._exit(1)
-
-    threading.Thread(target=wait, daemon=True).start()
-
-
-@contextmanager
-def _signals_deferred() -> Iterator[None]:
-    """Signals that end this process are handled after a child process has received its arguments.
-
-    A child process that does not receive them ends in a traceback. A terminal sends Ctrl-C to child
-    processes, too: this one starts with that signal blocked.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield  # no signal is handled here
-        return
-    came: list[int] = []
-    numbers = [signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)]
-    before = {one: signal.getsignal(one) for one in numbers}
-    before = {one: handler for one, handler in before.items() if callable(handler)}
-    for one in before:
-        signal.signal(one, lambda number, _: came.append(number))
-    can_block = hasattr(signal, "pthread_sigmask")  # not on Windows
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if can_block else None
-    try:
-        yield
-    finally:
-        if mask is not None:
-            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        for one, handler in before.items():
-            signal.signal(one, handler)
-        for number in came[:1]:
-            signal.raise_signal(number)
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """One core, one task: numerical libraries of child processes read this at import.
-
-    Two threads on products this small wait for each other more than they work, and on a busy
-    machine for each other alone.
-    """
-    before = {name: os.environ.get(name) for name in THREADS}
-    os.environ.update(dict.fromkeys(THREADS, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
-
-
-@contextmanager
-def _script_hidden() -> Iterator[None]:
-    """A child process does not run the script again that calls shiplog from Python.
-
-    It would import it as its main module. All that a task is made of is in modules of their own.
-    """
-    script = sys.modules["__main__"]
-    sys.modules["__main__"] = ModuleType("__main__")
-    try:
-        yield
-    finally:
-        sys.modules["__main__"] = script

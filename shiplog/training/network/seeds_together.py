@@ -177,7 +177,9 @@ class _EpochBatch:
     ) -> None:
         self.seeds = [one.seed for one in trainings]
         self._settings, self._shape = settings, trainings[0].shape
-        self._scale = _on(trainings[0].scaling, trainings[0].training.velocity.dtype, device)
+        self._scale = _move_scaling(
+            trainings[0].scaling, trainings[0].training.velocity.dtype, device
+        )
         self._training = _stacked([one.training for one in trainings], device)
         self._validation = _stacked([one.validation for one in trainings], device)
         count = self._training.velocity.shape[2]
@@ -254,12 +256,12 @@ class _EpochBatch:
         for rows in torch.tensor_split(self.order, self._settings.subsets, dim=1):
             if rows.shape[1] == 0:
                 continue
-            loss, gradients = network_gradient.together(
+            loss, gradients = network_gradient.joint_gradient(
                 self._weights, self._pick(rows), self._scale, self._shape
             )
             self._adam(gradients)
             self._found[0] += loss * (rows.shape[1] / count)
-        loss, _ = network_gradient.together(
+        loss, _ = network_gradient.joint_gradient(
             self._weights, self._validation, self._scale, self._shape, gradient=False
         )
         self._found[1] = loss
@@ -294,7 +296,7 @@ def _per_seed(values: Tensor, like: Tensor) -> Tensor:
     return values.view(-1, *[1] * (like.dim() - 1))
 
 
-def _on(scaling: Scaling, dtype: torch.dtype, device: torch.device) -> Scaling:
+def _move_scaling(scaling: Scaling, dtype: torch.dtype, device: torch.device) -> Scaling:
     return Scaling(*(getattr(scaling, n).to(device, dtype) for n in Scaling.__slots__))
 
 

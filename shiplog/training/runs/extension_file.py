@@ -55,7 +55,7 @@ def read(folder: RunFolder, own: Sequence[Cause] = ()) -> Extension | None:
         )
     arrays = run_files.arrays(folder.path / "extension.safetensors")
     try:
-        return Extension.of(content, arrays, own)
+        return Extension.from_record(content, arrays, own)
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise run_files.unreadable(path, error) from error
 

@@ -171,8 +171,8 @@ class Run(RunFolder, ABC):
 
     @abstractmethod
     def forces(self, seconds: pl.DataFrame) -> pl.DataFrame | None:
-        """Part by part along measured voyages, as `force_breakdown.along`; None where there are
-        no parts."""
+        """Part by part along measured voyages, as `force_breakdown.break_down`; None where there
+        are no parts."""
 
     @abstractmethod
     def _numbers(self, seed: int) -> tuple[Any, np.ndarray, np.ndarray]:
@@ -284,7 +284,9 @@ class PhysicalRun(Run):
     def forces(self, seconds: pl.DataFrame) -> pl.DataFrame | None:
         if self.extension is not None:  # its causes are no part of any force of the equations
             return None
-        return force_breakdown.along(self.simulator(self.config.seeds[0]), seconds, self.profile)
+        return force_breakdown.break_down(
+            self.simulator(self.config.seeds[0]), seconds, self.profile
+        )
 
     def _refuse_others(self, seed: int, count: int, names: Sequence[str]) -> None:
         """Raises RunError where the run's coefficients, `count` with a network's weights, are not

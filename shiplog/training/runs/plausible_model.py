@@ -29,7 +29,7 @@ def questions(run: Run) -> list[str]:
 def measured(forces: pl.DataFrame, rows: pl.DataFrame, profile: Profile) -> list[Asked]:
     """The ratios of the table in `plausibility`.
 
-    forces   part by part at every second of `rows`, as `force_breakdown.along` gives them
+    forces   part by part at every second of `rows`, as `force_breakdown.break_down` gives them
     """
     by = {name: frame["surge"].to_numpy() for (name,), frame in
           forces.group_by("part", maintain_order=True)}  # fmt: skip

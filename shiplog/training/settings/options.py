@@ -145,12 +145,12 @@ class TrainOptions:
         }  # fmt: skip
         if MODELS[self.model].family is PHYSICS:
             physics = {"fit": self.fit, "without": self.without, "free": self.free}
-            return shared | {"physics": physics | _known(folds=self.folds)}
+            return shared | {"physics": physics | _given(folds=self.folds)}
         return shared | {
             "recipe": self.recipe,
-            "network": {"width": self.width} | _known(wind_input=self.wind_input),
-            "paper": _known(most_epochs=self.epochs),
-            "fast": _known(iterations=self.epochs),
+            "network": {"width": self.width} | _given(wind_input=self.wind_input),
+            "paper": _given(most_epochs=self.epochs),
+            "fast": _given(iterations=self.epochs),
         }
 
     def given(self) -> list[str]:
@@ -158,6 +158,6 @@ class TrainOptions:
         return [one.name for one in fields(self) if getattr(self, one.name) != one.default]
 
 
-def _known(**values: Any) -> dict[str, Any]:
+def _given(**values: Any) -> dict[str, Any]:
     """Those that somebody gave."""
     return {name: value for name, value in values.items() if value is not None}

@@ -91,7 +91,7 @@ def _keeps_pace(reading: Reading, profile: Profile) -> bool:
     frame = reading.frames.get(profile.sensors.heading.topic)
     if frame is None or frame.height < 2:
         return False
-    column, _ = clocks.of(frame, profile.sensors.heading)
+    column, _ = clocks.clock_columns(frame, profile.sensors.heading)
     spans = [float(np.ptp(frame[name].drop_nulls().to_numpy())) for name in (column, RECORDER)]
     return abs(spans[0] - spans[1]) <= PACE * spans[0]
 

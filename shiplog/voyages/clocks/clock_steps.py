@@ -63,7 +63,11 @@ def put_right(reading: Reading, profile: Profile) -> tuple[Reading, list[Finding
     done: set[str] = set()
     for source in clocks.sources_of(profile):
         frame = frames.get(source.topic)
-        if frame is None or source.topic in done or clocks.of(frame, source)[0] != "stamp":
+        if (
+            frame is None
+            or source.topic in done
+            or clocks.clock_columns(frame, source)[0] != "stamp"
+        ):
             continue
         done.add(source.topic)
         if source.topic in reading.health.restarted:
@@ -88,7 +92,7 @@ def refuse_restarted(reading: Reading, profile: Profile) -> None:
         frame, back = reading.frames.get(source.topic), reading.health.restarted.get(source.topic)
         if frame is None or back is None:
             continue
-        column, _ = clocks.of(frame, source)
+        column, _ = clocks.clock_columns(frame, source)
         if column != RECORDER and not _stood_twice(frame, column):
             continue  # only the recorder's clock went back
         raise LogUnreadable(
@@ -182,7 +186,7 @@ def _stamps_right(frame: pl.DataFrame, steps: Steps) -> tuple[pl.DataFrame, str]
         wrong = late - steps.reference
         shift[first:last] = round(wrong * SECOND_NS)
         if abs(wrong) > STEP_S:
-            parts.append(_by(wrong))
+            parts.append(_size_of_step(wrong))
     add[known] = shift
     step = max((abs(b - a) for a, b in pairwise(steps.late)), default=0.0)
     counter = next(
@@ -197,7 +201,7 @@ def _stamps_right(frame: pl.DataFrame, steps: Steps) -> tuple[pl.DataFrame, str]
     return frame.with_columns(pl.col("stamp") + pl.Series(add)), what
 
 
-def _by(wrong: float) -> str:
+def _size_of_step(wrong: float) -> str:
     """By how much a stamp was off that came so much later [s] than its fellows."""
     side = "behind" if wrong > 0 else "ahead"
     return f"{dates.how_far(abs(wrong) * SECOND_NS)} {side} for a time"
@@ -223,7 +227,11 @@ def _recorder_right(
     wrong = [round((late - steps.reference) * SECOND_NS) for late in steps.late]
     for source in clocks.sources_of(profile):
         frame = frames.get(source.topic)
-        if frame is None or source.topic in topics or clocks.of(frame, source)[0] != RECORDER:
+        if (
+            frame is None
+            or source.topic in topics
+            or clocks.clock_columns(frame, source)[0] != RECORDER
+        ):
             continue
         times = frame[RECORDER].to_numpy()
         moved = times - np.array(wrong)[np.searchsorted(edges, times)]

@@ -37,7 +37,7 @@ def is_latency(late: float) -> bool:
     return -EARLY_S <= late <= LATEST_S
 
 
-def of(frame: pl.DataFrame, source: Source) -> tuple[str, str]:
+def clock_columns(frame: pl.DataFrame, source: Source) -> tuple[str, str]:
     """The column that says when a source measured, and the one to hold it against."""
     if source.clock == "message" and frame["stamp"].null_count() == frame.height:
         return COLUMNS["log"]  # the message carries no time: the recorder's is all there is
@@ -51,7 +51,7 @@ def without_strays(reading: Reading, profile: Profile) -> tuple[Reading, list[Fi
         frame = frames.get(source.topic)
         if frame is None or frame.height == 0:
             continue
-        clock, other = of(frame, source)
+        clock, other = clock_columns(frame, source)
         known = frame.filter(pl.col(clock).is_not_null())
         times = known[clock].to_numpy()
         if other == "publish_time" and not of_publishers(known):
@@ -145,7 +145,7 @@ def each(reading: Reading, profile: Profile) -> list[Clock]:
         frame = reading.frames.get(source.topic)
         if frame is None or frame.height == 0:
             continue
-        column, _ = of(frame, source)
+        column, _ = clock_columns(frame, source)
         both = frame.select(column, RECORDER).drop_nulls() if column != RECORDER else frame
         if both.height == 0:
             continue

@@ -154,7 +154,9 @@ def driven(t: Track, yaw_rate: np.ndarray) -> list[Driven]:
             found += counted
             if mostly and not can_push_sideways(t):
                 sure = {one.name for one in counted if one.against or one.along}
-                found += _held(t, yaw_rate, [n for n in rudders if n not in sure], ahead & small)
+                found += _steady_turns(
+                    t, yaw_rate, [n for n in rudders if n not in sure], ahead & small
+                )
     if thrusts:
         everywhere = np.ones(len(speed), bool)
         ahead = {name: part[0] for name, part in thrusts.items() if _acts(part[0], thrusts)}
@@ -170,7 +172,9 @@ def driven(t: Track, yaw_rate: np.ndarray) -> list[Driven]:
     return found
 
 
-def _held(t: Track, yaw_rate: np.ndarray, names: list[str], where: np.ndarray) -> Iterator[Driven]:
+def _steady_turns(
+    t: Track, yaw_rate: np.ndarray, names: list[str], where: np.ndarray
+) -> Iterator[Driven]:
     """How far the bow turns with a rudder that is held to one side, and how far against it. The
     first two ship's lengths after it is put over are left out: the old turn ends in them."""
     speed = np.abs(t.velocity)
@@ -220,7 +224,7 @@ def _counted(
         w = w.chosen(rows >= 0.9 * ROWS * (seconds + 1))
         if len(w.first) < FEWEST:
             continue
-        for one in _at(w, direction, _averaged(velocity, seconds), means, least > 0.0):
+        for one in _drive_at_length(w, direction, _averaged(velocity, seconds), means, least > 0.0):
             before = best.get(one.name)
             if before is None or one.explained > before.explained:
                 best[one.name] = one
@@ -232,7 +236,7 @@ def _averaged(velocity: np.ndarray, seconds: int) -> np.ndarray:
     return moving.mean(velocity, max(round(AVERAGED * seconds), 1))
 
 
-def _at(
+def _drive_at_length(
     w: Windows, direction: str, velocity: np.ndarray, means: dict[str, np.ndarray], steers: bool
 ) -> Iterator[Driven]:
     """At one length of window; steers: the forces are those of rudders."""

@@ -162,7 +162,7 @@ def ending(culprit: str, why: str, lines: Sequence[str], two: tuple[str, str]) -
 
 def gather(t: Track) -> Evidence:
     """All pairs of one voyage."""
-    turned, moved = pairs.heading_and_yaw_rate(t), pairs.under_way(t)
+    turned, moved = pairs.heading_and_yaw_rate(t), pairs.find_under_way(t)
     if moved is None:
         return Evidence(t, None, None, turned, None, None, (), None, None)
     by_rate = t.profile.sensors.yaw_rate is not None
@@ -175,7 +175,7 @@ def gather(t: Track) -> Evidence:
         turned,
         ways[0],
         None if t.body else ways[1],
-        tuple(_apart(one) for one in joined),
+        tuple(_unexplained_share(one) for one in joined),
         pairs.bend(t, moved, t.turned_by_rate) if by_rate else None,
         pairs.bend(t, moved, t.turned),
     )
@@ -208,7 +208,7 @@ def _way(j: Joined) -> Way | None:
     )
 
 
-def _apart(j: Joined) -> float:
+def _unexplained_share(j: Joined) -> float:
     """The share that the best formula leaves; radians count where the ship goes ahead by them."""
     left = [fit.left for name, fit in j.fits.items() if name != "in radians" or pairs.natural(fit)]
     return min(left, default=0.0)

@@ -88,7 +88,7 @@ def slowest(t: Track) -> float:
     return max(SLOW_MPS, min(froude, SLOW_MOST_MPS), steps)
 
 
-def under_way(t: Track) -> UnderWay | None:
+def find_under_way(t: Track) -> UnderWay | None:
     """At a length of window at which most of the time under way can be used; None where the ship
     hardly moves."""
     least, floor = slowest(t), math.sqrt(2.0) * OVER_NOISE * noise(t.place, t.usable)

@@ -48,7 +48,7 @@ def of_log(table: pl.DataFrame, profile: Profile, found: Sequence[Finding] = ())
     known = {one.channel for one in found if one.kind == "contradiction"}
     asked = [*of_profile(profile), *of_voyage(table, profile)]
     of_ratios = findings(one for one in asked if not known & {one.channel, *one.of})
-    return [*of_ratios, *twins.by_limits(table, profile)]
+    return [*of_ratios, *twins.find_exchanged(table, profile)]
 
 
 def not_compared(profile: Profile) -> tuple[NotCompared, ...]:
@@ -160,7 +160,7 @@ def of_voyage(table: pl.DataFrame, profile: Profile) -> list[Asked]:
     asked = [*_wind(rows, profile), *_angles(rows, profile), *_commands(rows, profile)]
     if rows.moving.sum() < LEAST_ROWS:
         return asked
-    if not _widened(profile, rows.speed_quantile):
+    if not _allows_speed(profile, rows.speed_quantile):
         froude = rows.speed_quantile / math.sqrt(GRAVITY * profile.ship.length_m)
         asked.append(Asked("Froude number", froude, "velocity"))
     return [*asked, *_turning(rows, profile), *_propellers(rows, profile)]
@@ -190,7 +190,7 @@ class _Rows:
         return values[np.isfinite(values)]
 
 
-def _widened(profile: Profile, speed: float) -> bool:
+def _allows_speed(profile: Profile, speed: float) -> bool:
     """Whether the profile's own limits of the velocity allow this speed."""
     sensor = profile.sensors.velocity
     if sensor.limits is None:

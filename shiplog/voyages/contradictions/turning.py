@@ -60,7 +60,7 @@ def heading_and_rate(e: Evidence) -> Iterator[Finding]:
         ends = sorted(math.log(abs(one)) for one in (low, high))
         if low < 0 or ends[0] > RATE_RATIO or ends[1] < -RATE_RATIO:
             yield _ratio(e, value, low, high)
-    elif by_heading <= few and by_rate >= enough and _known(back):
+    elif by_heading <= few and by_rate >= enough and _is_well_known(back):
         value, low, high = (1.0 / one for one in back.interval(0))
         yield _ratio(e, value, *sorted((low, high)))
     elif by_heading <= few and by_rate >= enough:
@@ -69,7 +69,7 @@ def heading_and_rate(e: Evidence) -> Iterator[Finding]:
             e.bent_by_rate is not None or np.ptp(e.t.turned_by_rate) > DRIFTS_RAD
         ):
             yield _stands(e, "heading", "yaw_rate", 1.0 / max(most, 1e-3))
-    elif by_rate <= few and by_heading >= enough and _known(rate):
+    elif by_rate <= few and by_heading >= enough and _is_well_known(rate):
         yield _ratio(e, *rate.interval(0))
     elif by_rate <= few and by_heading >= enough:
         most = max(abs(one) for one in rate.interval(0)[1:])
@@ -79,7 +79,7 @@ def heading_and_rate(e: Evidence) -> Iterator[Finding]:
         yield _unrelated(e, together)
 
 
-def _known(slope: Regression) -> bool:
+def _is_well_known(slope: Regression) -> bool:
     """Whether a small slope is known well, and is not one of things that are alike."""
     value, low, high = slope.interval(0)
     return abs(value) > SLOPE_HALVES * 0.5 * (high - low) and abs(value) < STANDS

@@ -17,7 +17,7 @@ from shiplog.logs.health.health_report import Finding, NotCompared
 from shiplog.ship_profile.profile import Actuator, Profile
 from shiplog.voyages.contradictions.actuators import Driven
 from shiplog.voyages.rows.resampling import RATE_HZ
-from shiplog.voyages.samples.actuator_limits import beyond
+from shiplog.voyages.samples.actuator_limits import exceeds
 
 MIRRORED = 0.02  # of the ship's length: by how much their places may differ from a mirror's
 ALIKE = 0.01  # of the range in which they move: the two always stand alike
@@ -64,7 +64,7 @@ def not_compared(
             )  # fmt: skip
 
 
-def by_limits(table: pl.DataFrame, profile: Profile) -> list[Finding]:
+def find_exchanged(table: pl.DataFrame, profile: Profile) -> list[Finding]:
     """Pairs that stand beyond their own limits and within each other's: they are exchanged, or
     their limits are."""
     found = []
@@ -91,10 +91,10 @@ def _exchanged_s(pair: Sequence[Actuator], values: Sequence[np.ndarray]) -> floa
     if own.si_limits is None or theirs.si_limits is None or own.si_limits == theirs.si_limits:
         return 0.0
     first, second = (one[np.isfinite(one)] for one in values)
-    excess = int(beyond(own, first).sum()), int(beyond(theirs, second).sum())
+    excess = int(exceeds(own, first).sum()), int(exceeds(theirs, second).sum())
     if min(excess) < BEYOND_ROWS:
         return 0.0
-    exchanged = beyond(theirs, first), beyond(own, second)
+    exchanged = exceeds(theirs, first), exceeds(own, second)
     if any(rows.mean() > 1.0 - WITHIN for rows in exchanged):
         return 0.0
     return max(excess) / RATE_HZ

@@ -82,7 +82,7 @@ def _motion(grid: VoyageGrid, sampled: Sampled) -> None:
         yaw_rate = grid.place("yaw_rate", samples["yaw_rate"])[:, 0]
     else:
         turning = sample_faults.differentiated(samples["heading"])
-        yaw_rate = resampling.onto(grid.times, turning).value[:, 0]
+        yaw_rate = resampling.interpolate_samples(grid.times, turning).value[:, 0]
     position = grid.place("position", samples["position"])
     if sampled.datum is not None:
         position = frames.local_plane(position[:, 0], position[:, 1], sampled.datum)
@@ -112,7 +112,7 @@ def _actuator(grid: VoyageGrid, actuator: Actuator, samples: resampling.Samples)
     placed = grid.place(actuator.name, samples)
     column = np.arctan2(placed[:, 1], placed[:, 0]) if actuator.circular else placed[:, 0]
     grid.columns[actuator.name] = column
-    beyond = actuator_limits.beyond(actuator, column)
+    beyond = actuator_limits.exceeds(actuator, column)
     grid.note(beyond, Quality.LIMITS, "limits", actuator.name, "stands beyond its limits")
 
 

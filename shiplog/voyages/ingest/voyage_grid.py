@@ -54,7 +54,7 @@ class VoyageGrid:
     def place(self, name: str, samples: resampling.Samples) -> np.ndarray:
         """A source's values on the grid [m, k]; its gaps, blanks and spikes noted. Of one that is
         too slow throughout, `sampling_findings` says so once."""
-        placed = resampling.onto(self.times, samples)
+        placed = resampling.interpolate_samples(self.times, samples)
         self.unknown[name] = placed.gap | placed.blank | placed.spike
         left_out = self.explained.get(name, self.times[:0])
         said = rows_explained(self.times, samples.time, left_out)
@@ -89,9 +89,9 @@ def mark_gaps(grid: VoyageGrid) -> None:
 
 def mark_holds(grid: VoyageGrid, profile: Profile, sampled: dict[str, resampling.Samples]) -> None:
     """Values that repeat although the ship moves; frozen ones, too long to be data."""
-    over_ground = _over_ground(grid)
+    over_ground = _ground_velocity(grid)
     for name, samples in sampled.items():
-        rows = held_values.held(
+        rows = held_values.find_held(
             name, samples, sampled, grid.times, grid.columns, over_ground, profile
         )
         fault_detection.mark(grid.marks, rows, Quality.HELD)
@@ -123,7 +123,7 @@ def mark_jumps(grid: VoyageGrid, profile: Profile, sampled: dict[str, resampling
 
     Looked for from one measured value to the next, not between rows that were interpolated.
     """
-    over_ground = np.nan_to_num(_over_ground(grid))
+    over_ground = np.nan_to_num(_ground_velocity(grid))
     position = np.nan_to_num(np.stack((grid.columns["x0"], grid.columns["y0"]), 1))
     found = []
     scale = held_values.METRE if profile.sensors.kind("position") == "geodetic" else 1.0
@@ -152,7 +152,7 @@ def mark_jumps(grid: VoyageGrid, profile: Profile, sampled: dict[str, resampling
     grid.findings += found
 
 
-def _over_ground(grid: VoyageGrid) -> np.ndarray:
+def _ground_velocity(grid: VoyageGrid) -> np.ndarray:
     """Velocity [m, 2] along x0 and y0; NaN where it or the heading is not known."""
     heading = grid.columns["heading"]
     surge, sway = grid.columns["surge"], grid.columns["sway"]

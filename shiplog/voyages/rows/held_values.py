@@ -28,7 +28,7 @@ METRE = 111_320.0  # m, a degree of latitude
 COUNTED = ("position", "heading")  # whose steps may be others where their numbers are larger
 
 
-def held(
+def find_held(
     name: str,
     samples: Samples,
     sampled: dict[str, Samples],

@@ -222,7 +222,7 @@ def grid(start: int, end: int) -> np.ndarray:
     return np.arange(start, end + 1, STEP_NS, dtype=np.int64)
 
 
-def onto(times: np.ndarray, samples: Samples) -> OnGrid:
+def interpolate_samples(times: np.ndarray, samples: Samples) -> OnGrid:
     """Interpolate between neighbouring samples no further apart than the tolerance, or than their
     stamps' jitter."""
     count, width = len(times), samples.value.shape[1]
@@ -230,10 +230,10 @@ def onto(times: np.ndarray, samples: Samples) -> OnGrid:
     if len(known) == 0:
         empty = np.full((count, width), np.nan)
         return OnGrid(
-            empty, np.ones(count, bool), _near(times, samples.blank), np.zeros(count, bool)
+            empty, np.ones(count, bool), _mark_near(times, samples.blank), np.zeros(count, bool)
         )
     if samples.hold:
-        return _held(times, samples)
+        return _hold(times, samples)
     right = np.searchsorted(known, times, side="left").clip(0, len(known) - 1)
     left = (right - (known[right] > times)).clip(0)
     span = known[right] - known[left]
@@ -249,7 +249,7 @@ def onto(times: np.ndarray, samples: Samples) -> OnGrid:
     spike = usable & (
         (samples.spike[left] & (share < 1.0)) | (samples.spike[right] & (share > 0.0))
     )
-    blank = ~usable & (_near(times, samples.blank) | _next_to_blank(times, samples))
+    blank = ~usable & (_mark_near(times, samples.blank) | _next_to_blank(times, samples))
     return OnGrid(value, ~usable & ~blank, blank, spike)
 
 
@@ -268,7 +268,7 @@ def _next_to_blank(times: np.ndarray, samples: Samples) -> np.ndarray:
     return inside & close & (none[left] | none[right])
 
 
-def _held(times: np.ndarray, samples: Samples) -> OnGrid:
+def _hold(times: np.ndarray, samples: Samples) -> OnGrid:
     """The value of the last sample before each time, until the next one, or a blank, or the
     tolerance is over. Before the first sample there is none."""
     at = np.searchsorted(samples.time, times + EXACT_NS, side="right") - 1
@@ -283,7 +283,7 @@ def _held(times: np.ndarray, samples: Samples) -> OnGrid:
     return OnGrid(value, ~usable & ~blanked, blanked, np.zeros(len(times), bool))
 
 
-def _near(times: np.ndarray, marked: np.ndarray) -> np.ndarray:
+def _mark_near(times: np.ndarray, marked: np.ndarray) -> np.ndarray:
     """Which grid times have a marked time within one step."""
     if len(marked) == 0:
         return np.zeros(len(times), bool)

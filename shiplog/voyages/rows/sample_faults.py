@@ -22,7 +22,7 @@ LONGER = 1.5  # times the rows in which a value is usually written: it stood sti
 FAST_SHARE = 0.9  # of the speeds: what a course's resolution is taken at
 
 
-def judged(
+def judge(
     samples: Samples, metric: np.ndarray, raw: np.ndarray, sensors: Sensors, name: str
 ) -> Samples:
     """Samples with their resolution, their noise, their spikes, and without what is no reading.
@@ -40,7 +40,7 @@ def judged(
     lost = _lost(samples.time, metric, spike)
     if name == "position" and len(metric) > 1:
         lost += [one for one in _elsewhere(samples.time, metric) if one not in lost]
-    return _without(replace(samples, spike=spike), metric, lost)
+    return _blank(replace(samples, spike=spike), metric, lost)
 
 
 def _resolution(
@@ -100,7 +100,7 @@ def _elsewhere(time: np.ndarray, metric: np.ndarray) -> list[tuple[int, int]]:
     return [(a, b - 1) for a, b in parts if 1 < b - a < longest and same[a + 1 : b].all()]
 
 
-def _without(samples: Samples, metric: np.ndarray, lost: list[tuple[int, int]]) -> Samples:
+def _blank(samples: Samples, metric: np.ndarray, lost: list[tuple[int, int]]) -> Samples:
     """Without those stretches, whose times become blank from the sample before to the one after."""
     away = np.zeros(len(samples.time), bool)
     for first, last in lost:

@@ -9,7 +9,7 @@ from shiplog.ship_profile.profile import Actuator
 SLACK = 1e-3  # of the range: rounding of a recorder, and no excess
 
 
-def beyond(actuator: Actuator, values: np.ndarray) -> np.ndarray:
+def exceeds(actuator: Actuator, values: np.ndarray) -> np.ndarray:
     """[n] bool of values [n] in SI (rad, rev/s, or 1); none where no limits are stated.
 
     An azimuth is compared modulo a full turn: 0 to 360 deg are all there is, wherever the angle is

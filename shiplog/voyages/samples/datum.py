@@ -24,7 +24,7 @@ Place = tuple[float, float]  # latitude, longitude [deg]
 log = logging.getLogger(__name__)
 
 
-def of(
+def choose(
     reading: Reading, profile: Profile, position: resampling.Samples
 ) -> tuple[Place, Finding | None]:
     """The log's own datum, else the profile's, else the first fix that lies near the others. One
@@ -35,7 +35,7 @@ def of(
     if len(position.value) == 0:
         return stated, None
     middle = np.median(position.value, axis=0)
-    away = _apart(middle, stated)
+    away = _distance(middle, stated)
     if away < FAR_DEG:
         return stated, None
     first = _first(reading, profile, position)
@@ -51,7 +51,7 @@ def _stated(reading: Reading, profile: Profile) -> tuple[Place | None, str]:
         return profile.site.datum, "[site]"
 
 
-def _apart(place: np.ndarray | Place, other: Place) -> float:
+def _distance(place: np.ndarray | Place, other: Place) -> float:
     """Degrees of a great circle, by its chord: √(Σ (e - e')²) = 2 sin(½ angle)."""
     chord = np.linalg.norm(_unit_vector(*place) - _unit_vector(*other))
     return float(np.degrees(2.0 * np.arcsin(min(0.5 * chord, 1.0))))
@@ -77,7 +77,7 @@ def _finding(profile: Profile, middle: np.ndarray, stated: Place, who: str, away
         ((longitude, latitude), "swapped", "the order of `fields` on [sensors.position]"),
     )
     for place, reason, line in known:
-        if abs(place[0]) <= 90.0 and _apart(place, stated) < NEAR_DEG:
+        if abs(place[0]) <= 90.0 and _distance(place, stated) < NEAR_DEG:
             return Finding(
                 "contradiction", "position", f"{head} Change: {line}.", value=round(away, 3),
                 unit="deg", reason=reason,

@@ -15,9 +15,9 @@ from shiplog.ship_profile.profile import Profile
 AT_REST = 0.26  # m/s, half a knot: from there on receivers that leave out the course state it
 
 
-def known(speed_course: np.ndarray) -> np.ndarray:
+def fill(speed_course: np.ndarray) -> np.ndarray:
     """Speed and course [n, 2] (m/s, rad), the velocity zero where only a small speed is known."""
-    blank = _without(speed_course)
+    blank = _without_course(speed_course)
     if not blank.any():
         return speed_course
     return np.where(blank[:, None], 0.0, speed_course)
@@ -25,7 +25,7 @@ def known(speed_course: np.ndarray) -> np.ndarray:
 
 def findings(speed_course: np.ndarray, topic: str) -> list[Finding]:
     """How many velocities [n, 2] have no course, and how large they are."""
-    blank = _without(speed_course)
+    blank = _without_course(speed_course)
     if not blank.any():
         return []
     most = float(np.max(speed_course[blank, 0]))
@@ -44,6 +44,6 @@ def findings_of(reading: Reading, profile: Profile, raw) -> list[Finding]:
     return findings(value, profile.sensors.velocity.topic)
 
 
-def _without(speed_course: np.ndarray) -> np.ndarray:
+def _without_course(speed_course: np.ndarray) -> np.ndarray:
     speed, course = speed_course.T
     return ~np.isfinite(course) & (speed >= 0.0) & (speed <= AT_REST)

@@ -90,7 +90,7 @@ def whole(reading: Reading, sensor: Sensor) -> Sensor:
     return sensor.model_copy(update=given)
 
 
-def of(value: np.ndarray, sensor: Sensor, kind: str) -> Orientation:
+def read_orientation(value: np.ndarray, sensor: Sensor, kind: str) -> Orientation:
     """value [n, 4] (x, y, z, w), or [n, 2] (z, w)."""
     known = value.shape[1] == len(QUATERNION)
     if not known and sensor.mounting_deg:

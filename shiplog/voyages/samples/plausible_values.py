@@ -73,7 +73,7 @@ def screened(reading: Reading, profile: Profile) -> tuple[Reading, Screen]:
         frame = frames.get(source.topic)
         if frame is None or frame.height == 0:
             continue
-        times = frame[clocks.of(frame, source)[0]]
+        times = frame[clocks.clock_columns(frame, source)[0]]
         raw = np.stack([_sent(frame[path]) for path in source.paths], axis=1)
         raw[times.is_null().to_numpy()] = np.nan
         clear = screen.clear(name, source, times.fill_null(0).to_numpy(), raw)

@@ -109,7 +109,7 @@ def sampled(reading: Reading, profile: Profile, sent: Mapping[str, Senders]) -> 
         )
     origin, misplaced = None, None
     if profile.sensors.kind("position") == "geodetic":
-        origin, misplaced = datum.of(reading, profile, sensors["position"])
+        origin, misplaced = datum.choose(reading, profile, sensors["position"])
     return Sampled(
         profile, sensors, driven, start, end, [*shared], [*moved, *mounting], [*refused],
         screen.left_out, frozenset(timed.contradicted), origin, misplaced,

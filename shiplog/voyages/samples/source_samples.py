@@ -28,7 +28,7 @@ def raw_values(reading: Reading, source: Source) -> tuple[np.ndarray, np.ndarray
     if frame is None or frame.height == 0:
         return np.zeros(0, np.int64), np.zeros((0, len(source.paths)))
     frame = two_sources.of_one(frame, source)
-    times = frame[clocks.of(frame, source)[0]]
+    times = frame[clocks.clock_columns(frame, source)[0]]
     values = [
         (_numbers(frame[path]) - offset) * factor
         for path, (offset, factor) in zip(source.paths, source.scale(), strict=True)
@@ -57,12 +57,12 @@ def of_sensor(reading: Reading, profile: Profile, name: str) -> resampling.Sampl
         value = value / channels.DEGREE  # `unit` made it radians; geodesy speaks degrees
         value = _on_earth(reading, sensor, value)
     elif kind in ("sog_cog", "from_bow"):
-        value = empty_course.known(value) if kind == "sog_cog" else value
+        value = empty_course.fill(value) if kind == "sog_cog" else value
         value = frames.earth_velocity(value[:, 0], value[:, 1])
     elif kind == "enu":
         value = value[:, ::-1]
     elif kind in orientation.KINDS:
-        value = orientation.of(value, sensor, kind).heading[:, None]
+        value = orientation.read_orientation(value, sensor, kind).heading[:, None]
     samples = resampling.ordered(
         times, value, sensor.tolerance_s, sensor.between == "hold",
         resampling.longest_s(profile.ship.length_m),
@@ -73,7 +73,7 @@ def of_sensor(reading: Reading, profile: Profile, name: str) -> resampling.Sampl
         latitude, longitude = samples.value.T
         longitude = np.unwrap(longitude, period=360.0)
         samples = replace(samples, value=np.stack((latitude, longitude), axis=1))
-    return sample_faults.judged(samples, _metric(samples.value, kind), raw, profile.sensors, name)
+    return sample_faults.judge(samples, _metric(samples.value, kind), raw, profile.sensors, name)
 
 
 def of_actuator(reading: Reading, actuator: Actuator, longest: float) -> resampling.Samples:
@@ -91,7 +91,7 @@ def mounting(reading: Reading, profile: Profile) -> list[Finding]:
     if kind not in orientation.KINDS:
         return []
     sensor = orientation.whole(reading, sensor)
-    found = orientation.of(raw_values(reading, sensor)[1], sensor, kind)
+    found = orientation.read_orientation(raw_values(reading, sensor)[1], sensor, kind)
     return orientation.findings(found, sensor, reading.contents.path.name)
 
 

@@ -128,7 +128,7 @@ def paths(name: str, source: Source) -> set[str]:
         return set()
     return {
         place + field for rule in _rules(name, source) for field in rule.names
-        for place in above(source)
+        for place in parents(source)
     }  # fmt: skip
 
 
@@ -149,7 +149,7 @@ def heeded(reading: Reading, profile: Profile) -> tuple[Reading, list[LeftOut]]:
         there = [path for path in source.paths if path in frame.columns]
         nothing = [pl.when(pl.lit(~bad)).then(pl.col(path)).alias(path) for path in there]
         frames[source.topic] = frame.with_columns(nothing)
-        times = frame[clocks.of(frame, source)[0]].filter(bad).drop_nulls().to_numpy()
+        times = frame[clocks.clock_columns(frame, source)[0]].filter(bad).drop_nulls().to_numpy()
         why = _why(reasons)
         if bad.all() and name in NEEDED:
             raise _none_valid(channel, source, frame.height, why, reading.contents.path.name)
@@ -186,7 +186,7 @@ def _rules(name: str, source: Source) -> list[Rule]:
     ]  # fmt: skip
 
 
-def above(source: Source) -> list[str]:
+def parents(source: Source) -> list[str]:
     """The parts of a message that hold a source's values, innermost first: `a.b.`, `a.`, ``."""
     names = source.paths[0].split(".")[:-1]
     return ["".join(f"{name}." for name in names[:depth]) for depth in range(len(names), -1, -1)]
@@ -206,7 +206,7 @@ def _bad(
         if re.search(rule.unlike, schema, re.IGNORECASE):
             continue
         for field_name in rule.names:
-            path = next((p + field_name for p in above(source) if p + field_name in frame), None)
+            path = next((p + field_name for p in parents(source) if p + field_name in frame), None)
             if path is None or path in source.paths:
                 continue
             for value, words, here in _met(frame[path], rule):

@@ -41,7 +41,7 @@ def several(path: Path, profile: Profile) -> dict[str, Senders]:
 
 def frames_of(source: Source) -> list[str]:
     """Where the frame of a source's values may stand, in its own part of the message first."""
-    return [place + name for place in status.above(source) for name in FRAMES]
+    return [place + name for place in status.parents(source) for name in FRAMES]
 
 
 def wanted(found: Mapping[str, Senders]) -> dict[str, set[str]]:

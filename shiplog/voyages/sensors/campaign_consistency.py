@@ -85,7 +85,7 @@ def seasons(begins: Mapping[str, float]) -> list[list[str]]:
     return found
 
 
-def together(motions: Sequence[Motion]) -> Motion:
+def join(motions: Sequence[Motion]) -> Motion:
     """Voyages one after another, each beginning a stretch of its own. Long ones give their first
     rows, so that all together have CAMPAIGN_ROWS at most."""
     most = max(CAMPAIGN_ROWS // max(len(motions), 1), 1)
@@ -131,7 +131,7 @@ def _fitted(
     ):
         if not names:
             continue
-        whole = together([motions[name] for name in names])
+        whole = join([motions[name] for name in names])
         found = sensor_consistency.of_motion(whole, profile, of_yaw_rate, not of_yaw_rate)
         estimates += found.estimates
         left += found.not_compared

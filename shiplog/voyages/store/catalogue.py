@@ -150,7 +150,7 @@ def facts(folder: Path) -> dict:
     return found
 
 
-def known(folder: Path) -> dict | None:
+def read_known(folder: Path) -> dict | None:
     """The same; None where it cannot be read, or names another voyage than the folder, or one that
     no ingest would have named so."""
     try:
@@ -162,7 +162,7 @@ def known(folder: Path) -> dict | None:
 
 
 def _entry(folder: Path) -> CatalogueEntry | None:
-    found = known(folder)
+    found = read_known(folder)
     if found is None:
         return None
     report = VoyageReport.from_json(found["report"])

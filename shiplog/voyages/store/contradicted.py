@@ -36,7 +36,7 @@ class Contradicted:
         }  # fmt: skip
 
 
-def of(store: Store, names: Iterable[str]) -> tuple[Contradicted, ...]:
+def list_contradicted(store: Store, names: Iterable[str]) -> tuple[Contradicted, ...]:
     """Of these voyages, or parts of voyages, as they were ingested."""
     found = []
     for name in names:

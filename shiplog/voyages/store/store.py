@@ -168,7 +168,7 @@ class Store:
         fingerprint = fingerprint_of(voyage.contents.sha256, voyage.profile, asked, made)
         state = "added"
         if place.is_dir():
-            facts = catalogue.known(place)
+            facts = catalogue.read_known(place)
             if facts and facts["sha256"] != voyage.contents.sha256:
                 raise StoreError(
                     f"The store {self.path} already holds another log as the voyage "
@@ -202,7 +202,7 @@ class Store:
         """Whether this very log, read through this very profile, is here already and whole, and
         was corrected if that is requested. Of what was `converted` the [table] counts, too."""
         folder = self._folder(name)
-        facts = catalogue.known(folder) if folder.is_dir() else None
+        facts = catalogue.read_known(folder) if folder.is_dir() else None
         fingerprint = fingerprint_of(sha256, profile, correct, converted)
         return bool(facts) and facts["fingerprint"] == fingerprint and _whole(folder, facts)
 

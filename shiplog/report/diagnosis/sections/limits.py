@@ -78,7 +78,7 @@ def of(decision: Decision, causes: Sequence[Cause], setting: Setting) -> tuple[L
         of_actuator = bool(getattr(cause, "actuator", "")) and not getattr(cause, "channel", "")
         found.append(
             Limit(
-                cause.name, expected.together(nats), parameters,
+                cause.name, expected.common_size(nats), parameters,
                 None if of_actuator else part, part if of_actuator else None,
             )
         )  # fmt: skip
