@@ -1,11 +1,8 @@
 """Recordings are written whole, and the viewer shows them, on this machine only."""
 
-import subprocess
 import sys
-import urllib.request
 from pathlib import Path
 
-import psutil
 import pytest
 
 from shiplog.exceptions import ShiplogError
@@ -61,11 +58,11 @@ def test_every_program_is_made_to_listen_on_this_machine_only(saved, monkeypatch
     class Program:
         def __init__(self, command, **_settings):
             started.append(command)
-            raise OSError("not started")
+            raise RuntimeError("not started")
 
     monkeypatch.setattr(native.subprocess, "Popen", Program)
     monkeypatch.setenv("DISPLAY", ":0")
-    with pytest.raises(OSError, match="not started"):
+    with pytest.raises(RuntimeError, match="not started"):
         viewer.open_viewer(saved) if how == "window" else viewer.serve(saved, port=0)
     ((*_, option, address),) = started
     assert (option, address) == ("--bind", "127.0.0.1")
@@ -76,37 +73,6 @@ def test_a_server_that_does_not_start_names_a_viewer_of_this_machine_only(saved,
     with pytest.raises(ShiplogError, match="did not start") as output:
         viewer.serve(saved, port=0)
     assert "`rerun --bind 127.0.0.1 FILE.rrd`" in output.value.hint
-
-
-@pytest.mark.viewer
-def test_the_web_viewer_listens_on_this_machine_only(saved):
-    with viewer.serve(saved, port=0) as served:
-        (server,) = psutil.Process(served.process.pid).children()
-        listening = server.net_connections("inet")
-        hosts = {c.laddr.ip for c in listening if c.status == psutil.CONN_LISTEN}
-        assert hosts == {"127.0.0.1"}
-        with urllib.request.urlopen(served.address, timeout=10) as page:
-            assert page.status == 200 and b"<html" in page.read()[:2000]
-    assert served.process.poll() is not None and not server.is_running()
-
-
-@pytest.mark.viewer
-def test_a_server_ends_with_the_command_whatever_ends_that(saved):
-    program = (
-        "import sys; from shiplog.report import viewer\n"
-        "with viewer.serve(sys.argv[1], port=0) as served:\n"
-        "    print('ready', flush=True); served.wait()\n"
-    )
-    command = subprocess.Popen(
-        [sys.executable, "-c", program, str(saved)], stdout=subprocess.PIPE, cwd=ROOT
-    )
-    with command:
-        assert command.stdout.readline() == b"ready\n"
-        started = psutil.Process(command.pid).children(recursive=True)
-        assert len(started) == 2  # the server and who watches over it
-        command.kill()
-    _, alive = psutil.wait_procs(started, timeout=30)
-    assert alive == []
 
 
 @pytest.mark.viewer

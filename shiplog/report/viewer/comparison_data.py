@@ -12,6 +12,7 @@ import polars as pl
 from shiplog.nomenclature import channels
 from shiplog.nomenclature.channels import Channel
 
+TIMELINE = "sim_time"  # seconds from a voyage's start, in every recording
 BAND = ("_low", "_high")  # of a simulated state: the ends of its 90 % band
 
 

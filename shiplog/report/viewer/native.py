@@ -1,7 +1,7 @@
 """Starting Rerun's own programs: the native viewer, the web server and the headless viewer.
 
-They listen on this machine only, and send no usage statistics. A browser loads Rerun's own page
-from the web server; nothing here decides what that page sends.
+They listen on this machine only, and send no usage statistics. A browser gets the page of
+`web_page`, which asks nobody else.
 """
 
 from __future__ import annotations
@@ -14,18 +14,21 @@ import subprocess
 import sys
 import tempfile
 import time
-import urllib.parse
+import urllib.request
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
 from shiplog.exceptions import ShiplogError
+from shiplog.report.viewer import web_page
+from shiplog.report.viewer.comparison_data import TIMELINE
 
 HOST = "127.0.0.1"
 RERUN = f"rerun --bind {HOST}"  # as a user starts it: alone, it listens on every interface
 WITHOUT_A_WINDOW = "use --save FILE.rrd to keep the recording, or --web to look at it in a browser."
 NATIVE_PATIENCE = 2.0  # s: a viewer that has no graphics says so at once
 WEB_PATIENCE = 30.0  # s: the first start on a slow disk
+_DIRECT = urllib.request.build_opener(urllib.request.ProxyHandler({}))  # this machine, no proxy
 
 
 # A server without a command is a third of a core until the machine is switched off. Whatever ends
@@ -64,18 +67,18 @@ class Served:
     """A recording that a browser on this machine can look at, until `stop`."""
 
     address: str
-    process: subprocess.Popen
+    page: web_page.Page
 
     def wait(self) -> None:
-        """Until the server ends, or the user ends it with Ctrl-C."""
+        """Until the user ends it with Ctrl-C."""
         try:
             with contextlib.suppress(KeyboardInterrupt):
-                self.process.wait()
+                self.page.wait()
         finally:
             self.stop()
 
     def stop(self) -> None:
-        stop(self.process)
+        self.page.stop()
 
     def __enter__(self) -> Served:
         return self
@@ -84,23 +87,39 @@ class Served:
         self.stop()
 
 
-def serve(path: str | Path, port: int = 9090) -> Served:
-    """Serve a recording to browsers on this machine; another port is taken if `port` is in use."""
+def serve(path: str | Path, port: int = 9090, time_s: float | None = None) -> Served:
+    """Serve a recording to browsers on this machine; another port is taken if `port` is in use.
+
+    time_s   where the cursor stands at first; the recording's beginning unless given
+    """
     path = existing(path)
-    web, data = free_port(port), free_port(9876)
-    source = urllib.parse.quote(f"rerun+http://{HOST}:{data}/proxy", safe="")
+    moment = None if time_s is None else web_page.cursor_at(TIMELINE, time_s)
+    page = web_page.Page(HOST, free_port(port), path, _web_program(), moment)
+    return Served(page.address, page)
+
+
+def _web_program() -> dict[str, bytes]:
+    """Rerun's viewer for browsers, which only its own server hands out: asked, and ended."""
     with tempfile.TemporaryFile() as output:
-        arguments = [str(path), "--serve-web", "--port", str(data), "--web-viewer-port", str(web)]
+        port = free_port()
+        # told of a recording elsewhere, which it never asks for, it serves nothing but its page
+        arguments = ["--serve-web", "--web-viewer-port", str(port), f"http://{HOST}/none.rrd"]
         process = start(arguments, output, supervised=True)
         try:
-            wait_for(process, (web, data), WEB_PATIENCE)
-        except TimeoutError:
-            stop(process)
+            wait_for(process, (port,), WEB_PATIENCE)
+            found = {}
+            for name in web_page.PROGRAM:
+                address = f"http://{HOST}:{port}/{name}"
+                with _DIRECT.open(address, timeout=WEB_PATIENCE) as answer:
+                    found[name] = answer.read()
+            return found
+        except OSError:  # TimeoutError, and what urllib reports, are of this kind
             raise ShiplogError(
                 f"The web viewer did not start: {last_words(output)}",
                 hint=f"use --save FILE.rrd, and open the file with `{RERUN} FILE.rrd`.",
             ) from None
-    return Served(f"http://{HOST}:{web}/?url={source}", process)
+        finally:
+            stop(process)
 
 
 def start(arguments: list[str], output: IO[bytes], supervised: bool = False) -> subprocess.Popen:

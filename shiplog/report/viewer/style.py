@@ -6,9 +6,10 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from shiplog.report.viewer.comparison_data import TIMELINE
+
 Colour = tuple[int, int, int, int]
 
-TIMELINE = "sim_time"
 MEASURED: Colour = (25, 25, 25, 255)
 MODEL_COLOURS: tuple[Colour, ...] = (  # Okabe and Ito: colour-blind readers can distinguish them
     (0, 114, 178, 255), (213, 94, 0, 255), (0, 158, 115, 255), (204, 121, 167, 255),
