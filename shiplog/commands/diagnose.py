@@ -98,7 +98,8 @@ def diagnose_run(
     else:
         done = Diagnosis(answer.too_little(run, recorded, before_effect), out)
     _save(done, store, names, began)
-    done = _drawn(done)
+    datums = {name: found for name in names if (found := store.datum(name)) is not None}
+    done = _drawn(replace(done, datums=datums))
     if extend is None:
         return done
     if done.after is None:

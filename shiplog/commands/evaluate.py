@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +19,13 @@ from shiplog.nomenclature.channels import STATE
 from shiplog.nomenclature.contract import CONTRACT
 from shiplog.report.evaluation.evaluation import Evaluation
 from shiplog.report.result import Printed
-from shiplog.report.viewer.comparison_data import BAND, ComparisonData, DrawnActuator
+from shiplog.report.viewer.comparison_data import (
+    BAND,
+    ComparisonData,
+    Current,
+    DrawnActuator,
+    Moment,
+)
 from shiplog.simulation import baselines, prediction_interval, scoring
 from shiplog.simulation import coverage as covering
 from shiplog.training.runs import load_model
@@ -94,6 +101,7 @@ def evaluate_runs(
         inside=_inside(scored, bands, cut),
         forces=_forces(opened, rows),
         contradicted=contradicted.of(store, names),
+        datums={name: found for name in names if (found := store.datum(name)) is not None},
     )
 
 
@@ -110,8 +118,8 @@ def save(evaluation: Evaluation) -> tuple[ShiplogError, ...]:
     return tuple(refused)
 
 
-def comparison(evaluation: Evaluation, title: str) -> ComparisonData:
-    """What the viewer shows of an evaluation."""
+def comparison(evaluation: Evaluation, title: str, moment: Moment | None = None) -> ComparisonData:
+    """What the viewer shows of an evaluation, opened at that moment."""
     run = evaluation.runs[0]
     labels = {r.name: f"{r.name} ({r.config.legend})" for r in evaluation.runs}
     profile = run.profile
@@ -130,6 +138,10 @@ def comparison(evaluation: Evaluation, title: str) -> ComparisonData:
         ).drop("run"),
         training=run.training().select(profile.columns),
         summary=evaluation.text,
+        extended=tuple(labels[r.name] for r in evaluation.runs if r.extension is not None),
+        datums=evaluation.datums,
+        current=_named_current(evaluation.runs),
+        moment=moment,
         banks=profile.site.banks,
         trained=run.name if len(evaluation.runs) > 1 else "",
         forces=None
@@ -190,6 +202,15 @@ def compare_runs(
     except ShiplogError as error:
         recording, lost = None, (*lost, error)
     return Comparison(found, recording, lost)
+
+
+def _named_current(runs: Sequence[Run]) -> Current | None:
+    """Of the first run that a diagnosis extended by one."""
+    for run in runs:
+        if (water := run.extension_numbers().get("current")) is not None:
+            north, east = (float(one) for one in water)
+            return Current(math.hypot(north, east), math.atan2(east, north))
+    return None
 
 
 def _numbered(cut: Windows) -> pl.DataFrame:

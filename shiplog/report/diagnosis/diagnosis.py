@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import polars as pl
@@ -32,6 +33,7 @@ class Diagnosis(Printed):
     after      the extended model; None without a named cause
     drawn      whether the pictures could be drawn
     extended   the run with the causes in it, where one was asked for and a cause is named
+    datums     voyage → latitude and longitude [deg] of its x₀ = y₀ = 0, where its log had them
     """
 
     verdict: Verdict
@@ -44,6 +46,7 @@ class Diagnosis(Printed):
     after: ExtendedSimulator | None = None
     drawn: bool = True
     extended: Run | None = None
+    datums: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def report(self) -> Path:

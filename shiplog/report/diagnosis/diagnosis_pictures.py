@@ -20,6 +20,7 @@ from shiplog.nomenclature.channels import STATE, VELOCITY
 from shiplog.report import viewer
 from shiplog.report.diagnosis import page
 from shiplog.report.diagnosis.diagnosis import Diagnosis
+from shiplog.report.viewer.comparison_data import Current
 from shiplog.report.viewer.diagnosis_data import AFTER, BEFORE, ERROR_COLUMNS, TRACKS, Exhibit
 from shiplog.voyages.rows.recording import Record
 from shiplog.voyages.windows.windows import Windows
@@ -52,7 +53,19 @@ def exhibit(done: Diagnosis) -> Exhibit:
         tracks=tracks,
         errors=errors,
         report=page.markdown(done.verdict),
+        run=Path(done.verdict.run).name,
+        datums=done.datums,
+        current=_current(decision),
     )
+
+
+def _current(decision: Decision) -> Current | None:
+    """Towards where the named current sets."""
+    for named in decision.named:
+        if named.cause.label == "current":
+            north, east = (float(one) for one in named.numbers)
+            return Current(float(np.hypot(north, east)), float(np.arctan2(east, north)))
+    return None
 
 
 def _measured(record: Record) -> pl.DataFrame:
@@ -60,7 +73,15 @@ def _measured(record: Record) -> pl.DataFrame:
     rows = np.flatnonzero(record.measured)
     rows = rows[:: max(1, round(1.0 / record.step))]
     index = {"voyage": [record.names[i] for i in record.voyage[rows]], "time": record.time[rows]}
-    return pl.DataFrame(index | _columns(record.state[rows]))
+    return pl.DataFrame(index | _columns(record.state[rows]) | _apparent_wind(record, rows))
+
+
+def _apparent_wind(record: Record, rows: np.ndarray) -> dict[str, np.ndarray]:
+    """Its speed and angle, where it was measured."""
+    if not record.profile.has_wind:
+        return {}
+    ahead, starboard = record.wind[rows].T
+    return {"wind_speed": np.hypot(ahead, starboard), "wind_angle": np.arctan2(starboard, ahead)}
 
 
 # --- forces ---------------------------------------------------------------------------------------

@@ -3,7 +3,8 @@ tables and JSON."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 import polars as pl
@@ -34,6 +35,7 @@ class Evaluation(Printed):
                squares on the first run's data
     inside     run, channel, share: of the samples inside the 90 % band, where a run has one
     forces     of the first physical run along the voyages, as ComparisonData has them; or None
+    datums     voyage → latitude and longitude [deg] of its x₀ = y₀ = 0, where its log had them
     contradicted   what was recorded on these voyages and contradicts itself
     """
 
@@ -48,6 +50,7 @@ class Evaluation(Printed):
     inside: pl.DataFrame
     forces: pl.DataFrame | None
     contradicted: tuple[Contradicted, ...] = ()
+    datums: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def json(self) -> dict:

@@ -34,7 +34,7 @@ VIEWS = {
     "histogram": histogram,
     "report": report,
 }
-LEFT = ("trajectory", "histogram")  # of a voyage's tab, one above the other
+LEFT = "trajectory"  # of a voyage's tab
 
 
 def write(comparison: ComparisonData, path: Path) -> None:
@@ -81,9 +81,9 @@ def layout(picture: Drawn) -> rrb.Blueprint:
     tabs: list[rrb.View | rrb.Container] = []
     for voyage in picture.voyages[: display.MOST_TABS]:
         parts = {name: view.blueprint(picture, voyage) for name, view in VIEWS.items()}
-        left = [part for name in LEFT if (part := parts.pop(name)) is not None]
+        track = parts.pop(LEFT)
+        assert track is not None
         right = [part for part in parts.values() if part is not None]
-        track = rrb.Vertical(*left, row_shares=[2.2, 1.0][: len(left)])
         tabs.append(rrb.Horizontal(track, *right, column_shares=[1.0, 1.45], name=voyage))
     own = (view.blueprint(picture, None) for view in VIEWS.values())
     tabs += [part for part in own if part is not None]

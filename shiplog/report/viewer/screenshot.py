@@ -11,7 +11,8 @@ from pathlib import Path
 from rerun.experimental import ViewerClient, ViewerState
 
 from shiplog.exceptions import ShiplogError
-from shiplog.report.viewer import native, style
+from shiplog.report.viewer import native
+from shiplog.report.viewer.comparison_data import TIMELINE
 
 LOAD_TIMEOUT_S = 30.0  # s
 DRAWN = 1.5  # s until a software renderer has drawn what it loaded
@@ -28,7 +29,7 @@ def screenshot(rrd: str | Path, png: str | Path, time_s: float | None = None) ->
             time.sleep(0.1)
         time.sleep(DRAWN)
         if time_s is not None:
-            viewer.set_time(style.TIMELINE, duration=time_s, play_state="paused")
+            viewer.set_time(TIMELINE, duration=time_s, play_state="paused")
             time.sleep(DRAWN)
         png = Path(png).resolve()
         png.parent.mkdir(parents=True, exist_ok=True)

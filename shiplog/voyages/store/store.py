@@ -181,6 +181,12 @@ class Store:
         """What was found when this voyage was ingested."""
         return VoyageReport.from_json(catalogue.facts(self._folder(name))["report"])
 
+    def datum(self, name: str) -> tuple[float, float] | None:
+        """Latitude and longitude [deg] of its x₀ = y₀ = 0; None where its log had metres."""
+        part = self.part_of(name)
+        found = catalogue.facts(self._folder(part.whole if part else name)).get("datum")
+        return None if found is None else (float(found[0]), float(found[1]))
+
     def profile(self, names: Iterable[str]) -> Profile:
         """The profile the voyages were read through. Raises StoreError for two ships, and for two
         profiles of one that differ in sizes, places or kinds of sensors."""
