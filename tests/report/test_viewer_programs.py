@@ -85,14 +85,14 @@ def test_the_viewer_shows_every_view_without_complaint(saved, tmp_path, no_viewe
         no_viewer(f"no headless viewer here: {error.message}")
     names = {view.name for view in state.views}
     for name in (
-        "error: log10(1 + d), dots where a window starts", "surge u [m/s]", "sway v_m [m/s]",
-        "yaw rate r [deg/s]", "heading ψ [deg]", "north x₀ [m]", "east y₀ [m]", "rudders [deg]",
-        "propellers [rev/s]", "apparent wind speed U_A [m/s]", "Report",
+        "position error [m], dots: window starts", "heading error [deg]", "surge u [m/s]",
+        "sway v_m [m/s]", "yaw rate r [deg/s]", "heading ψ [deg]", "rudder [deg]",
+        "propeller [rev/s]", "apparent wind speed U_A [m/s]", "Report",
         "Apparent wind, training [rows, log scale]", "Apparent wind, test [rows, log scale]",
         "surge u [m/s]: log10(1 + rows)",
     ):  # fmt: skip
         assert name in names, name
-    assert any(name.startswith("Track, north up, metres") for name in names)
+    assert any(name.startswith("Track [m], hull every") for name in names)
     assert not [report for view in state.views for report in view.reports]
     (recording,) = [r for r in state.recordings if r.timelines]
     (time,) = [t for t in recording.timelines if t.name == "sim_time"]

@@ -20,6 +20,7 @@ from shiplog.report.viewer.style import entity
 STATES = ("surge", "sway", "yaw_rate", "heading")  # drawn; where it was, the chart shows
 LEGEND_ROOM = 0.22  # of the voyage, free at the end of plots with a legend
 HALF_TURN = 180.0  # deg
+FITS_A_TITLE = 22  # letters after what stands in the longest one
 SPREAD = ("_lowest", "_highest")  # of all seeds
 CURVES: dict[str, tuple[str, ...]] = {  # column → its entity, in which the voyage comes second
     **{c.name: ("state", c.name) for c in channels.STATE},
@@ -56,8 +57,10 @@ def blueprint(drawn: Drawn, voyage: str | None) -> rrb.Container | None:
 
     titles = {c.name: c.label for c in channels.STATE if c.name in STATES}
     seeds = display.drawn_seeds(drawn)
-    if any(display.has_band(_bold(simulated, m, seeds[m]), "surge") for m in drawn.models):
-        titles["surge"] += ", pale lines: 90 % band"
+    banded = [m for m in drawn.models if display.has_band(_bold(simulated, m, seeds[m]), "surge")]
+    if banded:  # named once: a legend would hide a third of so flat a plot
+        whose = f" of {', '.join(banded)}"
+        titles["surge"] += ", pale lines: 90 % band" + whose * (len(whose) <= FITS_A_TITLE)
     if simulated.is_empty():
         first = []
     else:
