@@ -21,11 +21,14 @@ from shiplog.report.viewer.comparison_data import Current
 from shiplog.report.viewer.style import entity
 from shiplog.report.viewer.surroundings import Wind
 
-NARROWEST = 0.7  # width over height: words side by side need some
-LEFT, BELOW, ABOVE = 0.11, 0.07, 0.17  # of the chart's size: for coordinates, and for arrows
-ROW = 0.075  # of the size: a line of the key
-LETTERS = 64  # of the key side by side, where a chart has a third of a screen of 1920 points
-ARROW = 0.075  # of the size: an arrow's length
+# Words keep their size on the screen whatever the chart shows, so room for them is planned in
+# points, of a screen of 1920 by 1080 with the window as large; on another one all shrinks alike.
+TALL, FLAT = (780.0, 950.0), (780.0, 560.0)  # points: the view of a chart alone, and above a text
+LEFT, RIGHT, ABOVE, BELOW = 85.0, 20.0, 125.0, 45.0  # points: coordinates, and arrows above
+ROW = 50.0  # points: a line of the key
+LETTER = 7.2  # points: a letter is wide
+ARROW = 55.0  # points: an arrow is long
+LINE = 26.0  # points: from a place to the word below it
 MINUTE_M = 1852.0  # m: a minute of latitude
 DEGREE = 60  # minutes
 
@@ -36,16 +39,18 @@ Ends = tuple[float, float]
 class Frame:
     """Where things are on a chart, in its own units (m or km): east and north.
 
-    tracks  the part with the tracks
-    whole   with room for coordinates and words
+    east, north              the part with the tracks
+    whole_east, whole_north  with room for coordinates and words: as wide and tall as the view
+    point                    a point of the screen, in units of the chart
+    columns                  of the key
     """
 
     east: Ends
     north: Ends
     whole_east: Ends
     whole_north: Ends
-    size: float
-    columns: int  # of the key
+    point: float
+    columns: int
 
     @property
     def x_range(self) -> list[float]:
@@ -55,24 +60,35 @@ class Frame:
     def y_range(self) -> list[float]:
         return [-self.whole_north[1], -self.whole_north[0]]
 
+    @property
+    def size(self) -> float:
+        return max(self.east[1] - self.east[0], self.north[1] - self.north[0])
 
-def frame(east: Ends, north: Ends, entries: list[str]) -> Frame:
-    """Around tracks of this extent, with a key of these entries."""
-    tall = north[1] - north[0]
-    wide = max(east[1] - east[0], NARROWEST * tall)
-    middle = (east[0] + east[1]) / 2.0
-    east = (middle - wide / 2.0, middle + wide / 2.0)
-    size = max(wide, tall)
-    columns = max(1, min(4, LETTERS // (max(map(len, entries), default=1) + 4)))
-    rows = math.ceil(len(entries) / columns)
+
+def frame(east: Ends, north: Ends, entries: list[str], view: tuple[float, float] = TALL) -> Frame:
+    """Around tracks of this extent, with a key of these entries, in a view [points]."""
+    wide, tall = view
+    longest = max(map(len, entries), default=1) * LETTER + 25.0
+    columns = int(max(1, min(4, len(entries), wide // longest)))
+    below = BELOW + ROW * math.ceil(len(entries) / columns)
+    inner = (wide - LEFT - RIGHT, tall - ABOVE - below)
+    point = max((e[1] - e[0]) / length for e, length in zip((east, north), inner, strict=True))
+    east, north = (
+        _about((e[0] + e[1]) / 2.0, length * point)
+        for e, length in zip((east, north), inner, strict=True)
+    )
     return Frame(
         east,
         north,
-        (east[0] - LEFT * size, east[1] + 0.02 * size),
-        (north[0] - (BELOW + ROW * rows) * size, north[1] + ABOVE * size),
-        size,
+        (east[0] - LEFT * point, east[1] + RIGHT * point),
+        (north[0] - below * point, north[1] + ABOVE * point),
+        point,
         columns,
     )
+
+
+def _about(middle: float, length: float) -> Ends:
+    return middle - length / 2.0, middle + length / 2.0
 
 
 def grid_step(extent: float) -> float:
@@ -101,13 +117,13 @@ def send_grid(
         static=True,
     )
     meridians, parallels = _round(east, step), _round(north, step)  # none in a narrow chart
-    left, bottom = east[0] - 0.055 * frame.size, 0.01 * frame.size - north[0]
+    left, bottom = east[0] - 45.0 * frame.point, 5.0 * frame.point - north[0]
     places = [(x, bottom) for x in meridians] + [(left, -y) for y in parallels]
     names = [f"y₀ {x:g}" for x in meridians] + [f"x₀ {y:g}" for y in parallels]
     style.labels(recording, entity("track", voyage, "grid", "labels"), places, names)
     if datum is not None:
         names = _coordinates(meridians, parallels, frame, metres, datum)
-        top, right = -north[1], east[1] - 0.06 * frame.size
+        top, right = -north[1] - 0.7 * LINE * frame.point, east[1] - 45.0 * frame.point
         places = [(x, top) for x in meridians[::2]] + [(right, -y) for y in parallels]
         style.labels(recording, entity("track", voyage, "grid", "coordinates"), places, names)
 
@@ -149,11 +165,11 @@ def send_arrows(
     if current is not None:
         name = f"current {current.speed:.2g} m/s to {_bearing(current.direction)}"
         arrows.append((name, current.direction, colours.CURRENT))
-    length = ARROW * frame.size
-    shares = [0.08, 0.36, 0.7][: len(arrows)] if len(arrows) > 2 else [0.08, 0.42][: len(arrows)]
+    length = ARROW * frame.point
+    shares = (0.08, 0.33, 0.62)  # of the width
     width = frame.whole_east[1] - frame.whole_east[0]
-    middle = -frame.whole_north[1] + 0.055 * frame.size
-    centres = [(frame.whole_east[0] + share * width, middle) for share in shares]
+    middle = -frame.whole_north[1] + (ARROW / 2.0 + 10.0) * frame.point
+    centres = [(frame.whole_east[0] + share * width, middle) for share in shares[: len(arrows)]]
     vectors = [(length * math.sin(a), -length * math.cos(a)) for _, a, _ in arrows]
     recording.log(
         entity("track", voyage, "arrows"),
@@ -167,15 +183,16 @@ def send_arrows(
         ),
         static=True,
     )  # fmt: skip
-    words = [(x, y + 0.045 * frame.size) for x, y in centres]
+    below = (ARROW / 2.0) * frame.point
+    words = [(x, y + below) for x, y in centres]
     names = [name for name, *_ in arrows]
     bar = _scale(frame)
-    end = frame.whole_east[1] - 0.03 * frame.size
+    end, tick = frame.whole_east[1] - 30.0 * frame.point, 6.0 * frame.point
     recording.log(
         entity("track", voyage, "scale"),
         rr.LineStrips2D(
             [[(end - bar, middle), (end, middle)],
-             *([(x, middle - 0.01 * frame.size), (x, middle + 0.01 * frame.size)]
+             *([(x, middle - tick), (x, middle + tick)]
                for x in (end - bar, end))],
             colors=colours.TEXT,
             radii=rr.Radius.ui_points(1.5),
@@ -183,14 +200,14 @@ def send_arrows(
         ),
         static=True,
     )  # fmt: skip
-    words.append((end - bar / 2.0, middle + 0.045 * frame.size))
+    words.append((end - bar / 2.0, middle + below))
     names.append(f"{bar:g} {unit}")
     style.labels(recording, entity("track", voyage, "arrows", "labels"), words, names)
 
 
 def _scale(frame: Frame) -> float:
-    """A round length of a tenth to a fifth of the chart: 1, 2 or 5 times a power of ten."""
-    most = 0.2 * frame.size
+    """A round length of at most 130 points: 1, 2 or 5 times a power of ten."""
+    most = 130.0 * frame.point
     power = 10.0 ** math.floor(math.log10(most))
     return max(power * k for k in (1.0, 2.0, 5.0) if power * k <= most)
 
@@ -205,15 +222,15 @@ def send_key(
 ) -> None:
     """Below the tracks, side by side: a line of each colour, and below it what it is."""
     width = (frame.whole_east[1] - frame.whole_east[0]) / frame.columns
-    top = (BELOW + 0.015) * frame.size - frame.north[0]
+    top = BELOW * frame.point - frame.north[0]
     places = [
         (
             frame.whole_east[0] + (number % frame.columns + 0.5) * width,
-            top + ROW * frame.size * (number // frame.columns),
+            top + ROW * frame.point * (number // frame.columns),
         )
         for number in range(len(entries))
     ]
-    half = 0.06 * frame.size
+    half = 40.0 * frame.point
     recording.log(
         entity("track", voyage, "key"),
         rr.LineStrips2D(
@@ -224,7 +241,7 @@ def send_key(
         ),
         static=True,
     )
-    words = [(x, y + 0.012 * frame.size) for x, y in places]
+    words = [(x, y + 4.0 * frame.point) for x, y in places]
     style.labels(recording, entity("track", voyage, "key", "labels"), words, list(entries))
 
 

@@ -13,7 +13,7 @@ import rerun.blueprint as rrb
 from shiplog.nomenclature import channels
 from shiplog.report import colours
 from shiplog.report.evaluation.text_table import inert
-from shiplog.report.viewer import display, forces, style, timeline, tracking, trajectory
+from shiplog.report.viewer import chart, display, forces, style, timeline, tracking, trajectory
 from shiplog.report.viewer.comparison_data import ComparisonData
 from shiplog.report.viewer.diagnosis_data import AFTER, BEFORE, Exhibit
 from shiplog.report.viewer.display import Drawn
@@ -165,7 +165,7 @@ def _in_words(picture: Pictured, voyage: str) -> str:
 
 def _chart(picture: Pictured, voyage: str, name: str) -> rrb.View:
     tracks, _ = trajectory.in_chart_units(picture.tracks)
-    frame = trajectory.framed(tracks, voyage, ROOM)
+    frame = trajectory.framed(tracks, voyage, ROOM, chart.FLAT)
     return rrb.Spatial2DView(
         origin=entity("track", voyage),
         name=name,
@@ -229,7 +229,7 @@ def error_range(errors: pl.DataFrame) -> tuple[float, float]:
 
 def send(recording: rr.RecordingStream, picture: Pictured) -> None:
     """Charts, forces, errors and the report."""
-    trajectory.send(recording, picture.tracks, ROOM)
+    trajectory.send(recording, picture.tracks, ROOM, chart.FLAT)
     for voyage in picture.voyages:
         _send_forces(recording, picture, voyage)
         _send_positions(recording, picture, voyage)

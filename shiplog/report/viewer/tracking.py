@@ -9,34 +9,52 @@ from shiplog.report.viewer import display
 from shiplog.report.viewer.display import Drawn
 
 POSITION, HEADING = "position_error", "heading_error"  # m, deg
-SAME_INSTANT = 1e-3  # s: a rollout stands on the measured rows
+GAP = 1.5  # times the measured rows' step: between rows farther apart nothing was measured
 
 
 def with_errors(drawn: Drawn) -> pl.DataFrame:
     """`drawn.simulated` with
 
-    position_error  |p_sim - p| [m], p = (x₀, y₀); heading_error  ψ_sim - ψ in (-180, 180] [deg]
+    position_error  |p_sim - p| [m], p = (x₀, y₀); heading_error  ψ_sim - ψ in [-180, 180) [deg]
 
-    at the instants that were measured; elsewhere they are null.
+    where p and ψ are measured, between two rows on a straight line; null where nothing was.
     """
-    columns = ("voyage", "time", "x0", "y0", "heading")
-    measured = drawn.measured.select(columns).with_columns(pl.col("time").cast(pl.Float64))
-    off = (pl.col("heading") - pl.col("heading_measured") + 180.0) % 360.0 - 180.0
-    return (
-        drawn.simulated.with_row_index("row")
-        .sort("time", maintain_order=True)
-        .join_asof(
-            measured.sort("time"), on="time", by="voyage", strategy="nearest",
-            tolerance=SAME_INSTANT, suffix="_measured", check_sortedness=False,
+    tables = []
+    for (voyage,), rollouts in drawn.simulated.group_by("voyage", maintain_order=True):
+        measured = drawn.measured.filter(pl.col("voyage") == voyage)
+        time = display.column(rollouts, "time")
+        x0, y0, heading = _measured_at(measured, time)
+        position = np.hypot(
+            display.column(rollouts, "x0") - x0, display.column(rollouts, "y0") - y0
         )
-        .sort("row")
-        .with_columns(
-            ((pl.col("x0") - pl.col("x0_measured")).pow(2)
-             + (pl.col("y0") - pl.col("y0_measured")).pow(2)).sqrt().alias(POSITION),
-            pl.when(off == -180.0).then(180.0).otherwise(off).alias(HEADING),
+        off = (display.column(rollouts, "heading") - heading + 180.0) % 360.0 - 180.0
+        tables.append(
+            rollouts.with_columns(
+                pl.Series(POSITION, position, nan_to_null=True),
+                pl.Series(HEADING, off, nan_to_null=True),
+            )
         )
-        .select(*drawn.simulated.columns, POSITION, HEADING)
-    )  # fmt: skip
+    if not tables:
+        return drawn.simulated.with_columns(
+            pl.lit(None, pl.Float64).alias(name) for name in (POSITION, HEADING)
+        )
+    return pl.concat(tables)
+
+
+def _measured_at(measured: pl.DataFrame, time: np.ndarray) -> list[np.ndarray]:
+    """x₀, y₀ and heading at these instants, NaN where nothing was measured."""
+    at = display.column(measured, "time")
+    if len(at) < 2:
+        return [np.full(len(time), np.nan)] * 3
+    after = np.clip(np.searchsorted(at, time), 1, len(at) - 1)
+    step = at[after] - at[after - 1]
+    exact = np.isin(time, at)
+    known = (time >= at[0]) & (time <= at[-1])
+    known &= exact | (step <= GAP * float(np.median(np.diff(at))))
+    return [
+        np.where(known, np.interp(time, at, display.column(measured, name)), np.nan)
+        for name in ("x0", "y0", "heading")
+    ]
 
 
 def position_range(errors: pl.DataFrame, measured: pl.DataFrame) -> tuple[float, float]:

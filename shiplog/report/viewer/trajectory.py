@@ -48,9 +48,16 @@ def blueprint(drawn: Drawn, voyage: str | None) -> rrb.View | None:
 
 
 def framed(
-    drawn: Drawn, voyage: str, room: float = 0.0, about: Moment | None = None
+    drawn: Drawn,
+    voyage: str,
+    room: float = 0.0,
+    view: tuple[float, float] = chart.TALL,
+    about: Moment | None = None,
 ) -> chart.Frame:
-    """The chart of a voyage in chart units, or of what is about a moment of it."""
+    """The chart of a voyage in chart units, or of what is about a moment of it.
+
+    view   the size of its view [points]
+    """
     entries = list(key(drawn))
     if about is not None and about.voyage == voyage:
         begin, end = about.span
@@ -60,7 +67,7 @@ def framed(
             measured=drawn.measured.filter(within),
             simulated=drawn.simulated.filter(within),
         )
-    return chart.frame(*extent(drawn, voyage, room), entries)
+    return chart.frame(*extent(drawn, voyage, room), entries, view)
 
 
 def key(drawn: Drawn) -> dict[str, colours.Colour]:
@@ -68,15 +75,23 @@ def key(drawn: Drawn) -> dict[str, colours.Colour]:
     return {MEASURED: colours.MEASURED, **colours.colours(drawn.models, drawn.extended)}
 
 
-def send(recording: rr.RecordingStream, drawn: Drawn, room: float = 0.0) -> None:
-    """Tracks and hulls of every voyage, measured and simulated. `room`: as for `extent`."""
+def send(
+    recording: rr.RecordingStream,
+    drawn: Drawn,
+    room: float = 0.0,
+    view: tuple[float, float] = chart.TALL,
+) -> None:
+    """Tracks and hulls of every voyage, measured and simulated.
+
+    room, view   as for `framed`
+    """
     drawn, unit = in_chart_units(drawn)
     measured = drawn.measured
     simulated = drawn.simulated
     seeds = display.drawn_seeds(drawn)
     for voyage in drawn.voyages:
         rows = measured.filter(pl.col("voyage") == voyage)
-        _send_chart(recording, drawn, voyage, unit, room)
+        _send_chart(recording, drawn, voyage, unit, room, view)
         _send_measured(recording, drawn, voyage, rows)
         _send_window_starts(recording, voyage, simulated.filter(pl.col("voyage") == voyage))
         for model, colour in colours.colours(drawn.models, drawn.extended).items():
@@ -250,14 +265,19 @@ def _send_moving_hull(
 
 
 def _send_chart(
-    recording: rr.RecordingStream, drawn: Drawn, voyage: str, unit: str, room: float
+    recording: rr.RecordingStream,
+    drawn: Drawn,
+    voyage: str,
+    unit: str,
+    room: float,
+    view: tuple[float, float],
 ) -> None:
     """What stands about the tracks, and what the site has."""
-    frame = framed(drawn, voyage, room)
+    frame = framed(drawn, voyage, room, view)
     datum = drawn.datums.get(voyage)
     chart.send_grid(recording, voyage, frame, METRES[unit], datum)
     here = drawn.moment is not None and drawn.moment.voyage == voyage
-    about = framed(drawn, voyage, room, drawn.moment) if here else frame
+    about = framed(drawn, voyage, room, view, drawn.moment) if here else frame
     rows = drawn.measured.filter(pl.col("voyage") == voyage)
     wind = surroundings.mean_true_wind(rows) if drawn.has_wind else None
     chart.send_arrows(recording, voyage, about, unit, wind, drawn.current)
