@@ -24,7 +24,8 @@ from shiplog.report.viewer.surroundings import Wind
 # Words keep their size on the screen whatever the chart shows, so room for them is planned in
 # points, of a screen of 1920 by 1080 with the window as large; on another one all shrinks alike.
 TALL, FLAT = (780.0, 950.0), (780.0, 560.0)  # points: the view of a chart alone, and above a text
-LEFT, RIGHT, ABOVE, BELOW = 85.0, 20.0, 125.0, 45.0  # points: coordinates, and arrows above
+LEFT, RIGHT, ABOVE, BELOW = 85.0, 20.0, 125.0, 45.0  # points: x₀ and y₀, and arrows above
+LATITUDE = 110.0  # points: instead of RIGHT
 ROW = 50.0  # points: a line of the key
 LETTER = 7.2  # points: a letter is wide
 ARROW = 55.0  # points: an arrow is long
@@ -65,13 +66,20 @@ class Frame:
         return max(self.east[1] - self.east[0], self.north[1] - self.north[0])
 
 
-def frame(east: Ends, north: Ends, entries: list[str], view: tuple[float, float] = TALL) -> Frame:
-    """Around tracks of this extent, with a key of these entries, in a view [points]."""
+def frame(
+    east: Ends, north: Ends, entries: list[str], view: tuple[float, float] = TALL,
+    coordinates: bool = False,
+) -> Frame:  # fmt: skip
+    """Around tracks of this extent, with a key of these entries, in a view [points].
+
+    coordinates   with latitudes on its right
+    """
     wide, tall = view
+    right_room = LATITUDE if coordinates else RIGHT
     longest = max(map(len, entries), default=1) * LETTER + 25.0
     columns = int(max(1, min(4, len(entries), wide // longest)))
     below = BELOW + ROW * math.ceil(len(entries) / columns)
-    inner = (wide - LEFT - RIGHT, tall - ABOVE - below)
+    inner = (wide - LEFT - right_room, tall - ABOVE - below)
     point = max((e[1] - e[0]) / length for e, length in zip((east, north), inner, strict=True))
     east, north = (
         _about((e[0] + e[1]) / 2.0, length * point)
@@ -80,7 +88,7 @@ def frame(east: Ends, north: Ends, entries: list[str], view: tuple[float, float]
     return Frame(
         east,
         north,
-        (east[0] - LEFT * point, east[1] + RIGHT * point),
+        (east[0] - LEFT * point, east[1] + right_room * point),
         (north[0] - below * point, north[1] + ABOVE * point),
         point,
         columns,
@@ -123,7 +131,7 @@ def send_grid(
     style.labels(recording, entity("track", voyage, "grid", "labels"), places, names)
     if datum is not None:
         names = _coordinates(meridians, parallels, frame, metres, datum)
-        top, right = -north[1] - 0.7 * LINE * frame.point, east[1] - 45.0 * frame.point
+        top, right = -north[1] - 0.7 * LINE * frame.point, east[1] + 0.5 * LATITUDE * frame.point
         places = [(x, top) for x in meridians[::2]] + [(right, -y) for y in parallels]
         style.labels(recording, entity("track", voyage, "grid", "coordinates"), places, names)
 

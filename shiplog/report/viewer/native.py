@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib.util
+import logging
 import os
 import socket
 import subprocess
@@ -22,6 +23,8 @@ from typing import IO
 from shiplog.exceptions import ShiplogError
 from shiplog.report.viewer import web_page
 from shiplog.report.viewer.comparison_data import TIMELINE
+
+log = logging.getLogger(__name__)
 
 HOST = "127.0.0.1"
 RERUN = f"rerun --bind {HOST}"  # as a user starts it: alone, it listens on every interface
@@ -48,18 +51,38 @@ sys.exit(server.wait())
 """
 
 
-def open_viewer(path: str | Path) -> None:
-    """Show a recording in the native viewer, which stays open when shiplog is done."""
+def open_viewer(path: str | Path, time_s: float | None = None) -> None:
+    """Show a recording in the native viewer, which stays open when shiplog is done.
+
+    time_s   where the cursor stands at first; the recording's beginning unless given
+    """
     path = existing(path)
     if sys.platform == "linux" and not (os.getenv("DISPLAY") or os.getenv("WAYLAND_DISPLAY")):
         raise ShiplogError("No display is there to open the viewer on.", hint=WITHOUT_A_WINDOW)
+    port = free_port()
     with tempfile.TemporaryFile() as output:
-        viewer = start([str(path), "--port", "auto"], output)
+        viewer = start([str(path), "--port", str(port)], output)
         with contextlib.suppress(subprocess.TimeoutExpired):
             if viewer.wait(NATIVE_PATIENCE) != 0:
                 raise ShiplogError(
                     f"The viewer did not start: {last_words(output)}", hint=WITHOUT_A_WINDOW
                 )
+    if time_s is not None:
+        _put_cursor(port, time_s)
+
+
+def _put_cursor(port: int, time_s: float) -> None:
+    """Where the viewer does not take it, its charts are about the moment all the same."""
+    from rerun.experimental import ViewerClient
+
+    from shiplog.report.viewer import control
+
+    try:
+        viewer = ViewerClient(control.address(HOST, port))
+        if control.loaded(viewer) is not None:
+            control.seek(viewer, time_s)
+    except (ConnectionError, RuntimeError) as error:
+        log.warning("the viewer's cursor was not set to %g s: %s", time_s, error)
 
 
 @dataclass(frozen=True)

@@ -11,26 +11,28 @@ from pathlib import Path
 from rerun.experimental import ViewerClient, ViewerState
 
 from shiplog.exceptions import ShiplogError
-from shiplog.report.viewer import native
-from shiplog.report.viewer.comparison_data import TIMELINE
+from shiplog.report.viewer import control, native
 
-LOAD_TIMEOUT_S = 30.0  # s
 DRAWN = 1.5  # s until a software renderer has drawn what it loaded
 
 
-def screenshot(rrd: str | Path, png: str | Path, time_s: float | None = None) -> ViewerState:
-    """Save what the viewer shows at first sight, at `time_s`, and return the viewer's state."""
+def screenshot(
+    rrd: str | Path, png: str | Path, time_s: float | None = None, drawn: float = DRAWN
+) -> ViewerState:
+    """Save what the viewer shows at first sight, at `time_s`, and return the viewer's state.
+
+    drawn   s that the viewer is given to draw
+    """
     with headless() as viewer:
         viewer.open(str(native.existing(rrd)))
-        end = time.monotonic() + LOAD_TIMEOUT_S
-        while (state := viewer.get_state()).loading or not state.views:
-            if time.monotonic() > end:
-                raise ShiplogError(f"The viewer did not load {rrd} within {LOAD_TIMEOUT_S:g} s.")
-            time.sleep(0.1)
-        time.sleep(DRAWN)
+        if control.loaded(viewer) is None:
+            raise ShiplogError(
+                f"The viewer did not load {rrd} within {control.LOAD_TIMEOUT_S:g} s."
+            )
+        time.sleep(drawn)
         if time_s is not None:
-            viewer.set_time(TIMELINE, duration=time_s, play_state="paused")
-            time.sleep(DRAWN)
+            control.seek(viewer, time_s)
+            time.sleep(drawn)
         png = Path(png).resolve()
         png.parent.mkdir(parents=True, exist_ok=True)
         viewer.save_screenshot(str(png))
@@ -44,8 +46,8 @@ def headless() -> Iterator[ViewerClient]:
     with tempfile.TemporaryFile() as output:
         process = native.start(["--headless", "--port", str(port)], output, supervised=True)
         try:
-            native.wait_for(process, (port,), LOAD_TIMEOUT_S)
-            yield ViewerClient(f"rerun+http://{native.HOST}:{port}/proxy")
+            native.wait_for(process, (port,), control.LOAD_TIMEOUT_S)
+            yield ViewerClient(control.address(native.HOST, port))
         except (TimeoutError, ConnectionError):  # it never listened, or ended when it had to draw
             raise ShiplogError(
                 f"The headless viewer did not start: {native.last_words(output)}",

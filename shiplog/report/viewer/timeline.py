@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 import polars as pl
@@ -28,68 +30,81 @@ CURVES: dict[str, tuple[str, ...]] = {  # column → its entity, in which the vo
 }  # fmt: skip
 
 
-def blueprint(drawn: Drawn, voyage: str | None) -> rrb.Container | None:
-    """Two columns of plots, each over the whole voyage: a linked time axis would not show it.
+@dataclass(frozen=True)
+class Plot:
+    """One axis along time: its title, its entity, from where to where it shows."""
 
-    First how far each model is off and the states, then what acted on ship and models.
-    """
+    title: str
+    origin: tuple[str, ...]
+    reach: tuple[float, float] | None
+    legend: bool = False
+
+
+def blueprint(drawn: Drawn, voyage: str | None) -> rrb.Container | None:
+    """Two columns of plots, each over the whole voyage: a linked time axis would not show it."""
     if voyage is None:
         return None
-    rows = drawn.measured.filter(pl.col("voyage") == voyage)
-    simulated = tracking.with_errors(drawn).filter(pl.col("voyage") == voyage)
-    groups = actuator_groups(drawn)
-    several = any(len(names) > 1 for _, _, names in groups.values())
-    axes = [time_axis(drawn, voyage, after) for after in (0.04, LEGEND_ROOM if several else 0.04)]
-    rows, simulated = (shown(drawn, voyage, table) for table in (rows, simulated))
+    of = pl.col("voyage") == voyage
+    here = replace(drawn, simulated=drawn.simulated.filter(of), measured=drawn.measured.filter(of))
+    columns = []
+    for plots in plots_of(drawn, voyage, tracking.with_errors(here)):
+        legends = any(plot.legend for plot in plots)
+        axis = time_axis(drawn, voyage, LEGEND_ROOM if legends else 0.04)
+        views = [
+            rrb.TimeSeriesView(
+                origin=entity(*plot.origin),
+                name=plot.title,
+                axis_x=axis,
+                axis_y=None if plot.reach is None else rrb.ScalarAxis(range=plot.reach),
+                plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=plot.legend),
+                background=style.plot_background(),
+            )
+            for plot in plots
+        ]
+        columns.append(rrb.Vertical(*views))
+    return rrb.Horizontal(*columns, column_shares=[1.25, 1.0][: len(columns)])
 
-    def plot(
-        name: str, *origin: str, reach: tuple[float, float] | None, column: int = 0,
-        legend: bool = False,
-    ) -> rrb.View:  # fmt: skip
-        return rrb.TimeSeriesView(
-            origin=entity(*origin),
-            name=name,
-            axis_x=axes[column],
-            axis_y=None if reach is None else rrb.ScalarAxis(range=reach),
-            plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=legend),
-            background=style.plot_background(),
-        )
 
+def plots_of(drawn: Drawn, voyage: str, errors: pl.DataFrame) -> list[list[Plot]]:
+    """First how far each model is off and the states, then what acted on ship and models.
+
+    errors   as `tracking.with_errors`
+    """
+    rows = shown(drawn, voyage, drawn.measured.filter(pl.col("voyage") == voyage))
+    simulated = shown(drawn, voyage, errors.filter(pl.col("voyage") == voyage))
     titles = {c.name: c.label for c in channels.STATE if c.name in STATES}
     seeds = display.drawn_seeds(drawn)
     banded = [m for m in drawn.models if display.has_band(_bold(simulated, m, seeds[m]), "surge")]
     if banded:  # named once: a legend would hide a third of so flat a plot
         whose = f" of {', '.join(banded)}"
         titles["surge"] += ", pale lines: 90 % band" + whose * (len(whose) <= FITS_A_TITLE)
-    if simulated.is_empty():
-        first = []
-    else:
-        first = [
-            plot("position error [m], dots: window starts", "error", voyage, "position",
-                 reach=tracking.position_range(simulated, rows)),
-            plot("heading error [deg]", "error", voyage, "heading",
-                 reach=tracking.heading_range(simulated)),
-        ]  # fmt: skip
-    seam = compass_seam(drawn, voyage)
+    first: list[Plot] = []
+    if not simulated.is_empty():
+        reach = tracking.position_range(simulated, rows)
+        origin = ("error", voyage, "position")
+        first.append(Plot("position error [m], dots: window starts", origin, reach))
+        reach = tracking.heading_range(simulated)
+        first.append(Plot("heading error [deg]", ("error", voyage, "heading"), reach))
     for name in STATES:
         reach = readable_range(rows, simulated, [name])
         if name == "heading":
+            seam = compass_seam(drawn, voyage)
             reach = (seam - 2.0 * HALF_TURN - 8.0, seam + 8.0)
-        first.append(plot(titles[name], "state", voyage, name, reach=reach))
+        first.append(Plot(titles[name], ("state", voyage, name), reach))
     second = [
-        plot(f"{_plural(kinds, names)} [{unit}]", "actuator", voyage, group, column=1,
-             legend=len(names) > 1, reach=readable_range(rows, simulated, names))
-        for group, (kinds, unit, names) in groups.items()
-    ]  # fmt: skip
+        Plot(
+            f"{_plural(kinds, names)} [{unit}]",
+            ("actuator", voyage, group),
+            readable_range(rows, simulated, names),
+            legend=len(names) > 1,
+        )
+        for group, (kinds, unit, names) in actuator_groups(drawn).items()
+    ]
     if drawn.has_wind:
-        second += [
-            plot(f"apparent {c.label}", "wind", voyage, c.name, column=1,
-                 reach=readable_range(rows, simulated, [c.name]))
-            for c in channels.WIND
-        ]  # fmt: skip
-    if not second:
-        return rrb.Vertical(*first)
-    return rrb.Horizontal(rrb.Vertical(*first), rrb.Vertical(*second), column_shares=[1.25, 1.0])
+        for c in channels.WIND:
+            reach = readable_range(rows, simulated, [c.name])
+            second.append(Plot(f"apparent {c.label}", ("wind", voyage, c.name), reach))
+    return [first, second] if second else [first]
 
 
 def _plural(kinds: list[str], names: list[str]) -> str:
@@ -159,6 +174,22 @@ def send(recording: rr.RecordingStream, drawn: Drawn) -> None:
     for voyage in drawn.voyages:
         _send_measured(recording, drawn, voyage, measured.filter(pl.col("voyage") == voyage))
         _send_simulated(recording, drawn, voyage, simulated.filter(pl.col("voyage") == voyage))
+        if (moment := drawn.moment) is not None and moment.voyage == voyage:
+            for plot in chain(*plots_of(drawn, voyage, simulated)):
+                _mark(recording, plot, moment.seconds)
+
+
+def _mark(recording: rr.RecordingStream, plot: Plot, seconds: float) -> None:
+    """An upright line at the moment: a recording's cursor is at its beginning when it is opened
+    again."""
+    if plot.reach is None:
+        return
+    ends = np.array([[plot.reach[0]], [plot.reach[1]]])
+    at = np.array([seconds, seconds + 1e-3])  # of two values at one instant only one is drawn
+    path = entity(*plot.origin, "moment")
+    send_lines(
+        recording, path, at, ends, np.empty(0, dtype=np.intp), ["the moment"], colours.TEXT, 0.7
+    )
 
 
 def readable_range(

@@ -67,7 +67,7 @@ def framed(
             measured=drawn.measured.filter(within),
             simulated=drawn.simulated.filter(within),
         )
-    return chart.frame(*extent(drawn, voyage, room), entries, view)
+    return chart.frame(*extent(drawn, voyage, room), entries, view, voyage in drawn.datums)
 
 
 def key(drawn: Drawn) -> dict[str, colours.Colour]:
@@ -93,6 +93,8 @@ def send(
         rows = measured.filter(pl.col("voyage") == voyage)
         _send_chart(recording, drawn, voyage, unit, room, view)
         _send_measured(recording, drawn, voyage, rows)
+        if drawn.moment is not None and drawn.moment.voyage == voyage:
+            _mark(recording, voyage, rows, drawn.moment)
         _send_window_starts(recording, voyage, simulated.filter(pl.col("voyage") == voyage))
         for model, colour in colours.colours(drawn.models, drawn.extended).items():
             rollouts = simulated.filter(pl.col("voyage") == voyage, pl.col("model") == model)
@@ -187,6 +189,27 @@ def _send_measured(
         static=True,
     )
     _send_moving_hull(recording, drawn, voyage, "measured", colours.MEASURED, rows)
+
+
+def _mark(recording: rr.RecordingStream, voyage: str, rows: pl.DataFrame, moment: Moment) -> None:
+    """Where the ship was at the moment."""
+    time, places = display.column(rows, "time"), positions(rows)
+    known = np.isfinite(places).all(axis=1)
+    if not known.any():
+        return
+    place = [float(np.interp(moment.seconds, time[known], axis)) for axis in places[known].T]
+    recording.log(
+        entity("track", voyage, "moment"),
+        rr.Points2D(
+            [place],
+            labels=[f"{moment.seconds:g} s"],
+            show_labels=True,
+            colors=colours.TEXT,
+            radii=rr.Radius.ui_points(6.0),
+            draw_order=35.0,
+        ),
+        static=True,
+    )
 
 
 def _send_simulated(
