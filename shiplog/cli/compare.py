@@ -18,7 +18,19 @@ def compare(
     voyages: TestVoyages = None,
     store: StoreOption = STORE,
     save: Annotated[
-        Path | None, typer.Option(help="Write the recording here and open nothing.")
+        Path | None,
+        typer.Option(
+            metavar="FILE.rrd|png|svg",
+            help="Write the recording, or a picture, here and open nothing.",
+        ),
+    ] = None,
+    at: Annotated[
+        str | None,
+        typer.Option(
+            metavar="VOYAGE:SECONDS",
+            help="Open it at this moment: that voyage in front, the charts about it. Without "
+            "--voyages, only that voyage is compared.",
+        ),
     ] = None,
     web: Annotated[
         bool,
@@ -34,12 +46,15 @@ def compare(
     Example: shiplog compare runs/ref runs/d-ref --save compare.rrd
     """
     from shiplog.machine.paths import check_file
+    from shiplog.report.viewer import saving
 
     if web and save is not None:
         raise UsageError(
             "--web serves the recording, and --save writes it and opens nothing.",
             hint="leave one of them out.",
         )
+    if save is not None:
+        saving.check(save)
     check_runs(runs, store, voyages, cause)
     to = check_file(save or runs[0] / "compare.rrd", "--save")
     from shiplog.commands.bars import loading
@@ -48,12 +63,12 @@ def compare(
         from shiplog.commands.evaluate import compare_runs
     from shiplog.voyages.store.store import Store
 
-    result = compare_runs(runs, Store(store), voyages or [], to, cause or [])
+    result = compare_runs(runs, Store(store), voyages or [], to, cause or [], at)
     answer(result, json_to)
     lost = list(result.lost)
     if save is None and result.recording is not None:
         try:
-            show(result.recording, web)
+            show(result.recording, web, result.moment and result.moment.seconds)
         except ShiplogError as error:
             lost.append(error)
     leave_lost(lost)

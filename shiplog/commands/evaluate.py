@@ -19,6 +19,7 @@ from shiplog.nomenclature.channels import STATE
 from shiplog.nomenclature.contract import CONTRACT
 from shiplog.report.evaluation.evaluation import Evaluation
 from shiplog.report.result import Printed
+from shiplog.report.viewer import saving
 from shiplog.report.viewer.comparison_data import (
     BAND,
     ComparisonData,
@@ -37,11 +38,13 @@ from shiplog.training.runs.run_checks import (
     refuse_other_window,
 )
 from shiplog.training.runs.voyages_to_test import held_back, say_twins
-from shiplog.voyages.store import contradicted
+from shiplog.voyages.store import contradicted, moments
 from shiplog.voyages.store.store import Store
 from shiplog.voyages.windows import windows
 from shiplog.voyages.windows.split import plan
 from shiplog.voyages.windows.windows import Windows
+
+WINDOWS_SHOWN = 2.0  # windows about a moment: one before it and one after
 
 
 @staged("evaluating", {"reading": 1.0, "simulating": 3.0, "coverage": 1.0, "forces": 1.0})
@@ -154,32 +157,44 @@ def comparison(evaluation: Evaluation, title: str, moment: Moment | None = None)
 
 @dataclass(frozen=True, repr=False)
 class Comparison(Printed):
-    """`recording` is a Rerun file of measured and simulated voyages, `evaluation` what it shows.
+    """`saved` is a Rerun file, or a picture, of measured and simulated voyages, `evaluation` what
+    it shows.
 
-    lost   what could not be written, and why. Without the recording, `recording` is None and all
-           else is there
+    lost     what could not be written, and why. Without the file, `saved` is None and all else is
+             there
+    moment   what it is opened at
     """
 
     evaluation: Evaluation
-    recording: Path | None
+    saved: Path | None
     lost: tuple[ShiplogError, ...] = ()
+    moment: Moment | None = None
+
+    @property
+    def recording(self) -> Path | None:
+        """The Rerun file; None where a picture was asked for, or it could not be written."""
+        return self.saved if self.saved is None or self.saved.suffix.lower() == ".rrd" else None
 
     @property
     def lines(self) -> list[str]:
-        return [*self.evaluation.lines, "", f"Recording: {self.recording or 'none'}"]
+        what = "Recording" if self.saved is None else saving.NAMES[self.saved.suffix.lower()]
+        return [*self.evaluation.lines, "", f"{what}: {self.saved or 'none'}"]
 
     @property
     def json(self) -> dict:
         found = self.evaluation
         where = None if self.recording is None else str(self.recording)
         answers = {run.name: found.answer(run) for run in found.runs}
-        return {"contract": CONTRACT, "recording": where, "runs": answers}
+        answer = {"contract": CONTRACT, "recording": where, "runs": answers}
+        if self.saved is not None and self.recording is None:
+            answer["saved"] = str(self.saved)
+        return answer
 
     def written(self) -> Path:
-        """The recording. Raises ShiplogError where it could not be written."""
-        if self.recording is None:
+        """The file. Raises ShiplogError where it could not be written."""
+        if self.saved is None:
             raise self.lost[-1]
-        return self.recording
+        return self.saved
 
 
 def compare_runs(
@@ -188,20 +203,31 @@ def compare_runs(
     voyages: Sequence[str],
     save_to: Path | None,
     cause_files: Sequence[Path] = (),
+    at: str | None = None,
 ) -> Comparison:
     """Evaluate the runs on the same windows and record both sides; in the first run's folder
-    unless a path is given."""
-    from shiplog.report import viewer
+    unless a path is given, whose ending says what is written.
 
+    at   VOYAGE:SECONDS that it is opened at; without `voyages`, that voyage alone is compared
+    """
+    if save_to is not None:
+        saving.check(save_to)
+    moment = None if at is None else moments.parse(at)
+    if moment is not None:
+        moments.check(store, *moment)
+        voyages = moments.among(store, moment[0], voyages)
     found = evaluate_runs(paths, store, voyages, cause_files)
+    opened = None
+    if moment is not None:
+        opened = Moment(*moment, WINDOWS_SHOWN * found.runs[0].config.window)
     lost = save(found)
-    recording = save_to or found.runs[0].path / "compare.rrd"
+    saved: Path | None = save_to or found.runs[0].path / "compare.rrd"
     title = f"{found.runs[0].profile.ship.name}: {listed(found.voyages, most=3)}"
     try:
-        viewer.save(comparison(found, title), recording)
+        saving.write(comparison(found, title, opened), saved)
     except ShiplogError as error:
-        recording, lost = None, (*lost, error)
-    return Comparison(found, recording, lost)
+        saved, lost = None, (*lost, error)
+    return Comparison(found, saved, lost, opened)
 
 
 def _named_current(runs: Sequence[Run]) -> Current | None:
