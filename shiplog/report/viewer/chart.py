@@ -16,7 +16,7 @@ import rerun as rr
 
 from shiplog.nomenclature import frames
 from shiplog.report import colours
-from shiplog.report.viewer import style
+from shiplog.report.viewer import style, surroundings
 from shiplog.report.viewer.comparison_data import Current
 from shiplog.report.viewer.style import entity
 from shiplog.report.viewer.surroundings import Wind
@@ -115,7 +115,7 @@ def send_grid(
     """
     east, north = frame.east, frame.north
     step = grid_step(frame.size)
-    beyond = 3 * step  # lines go on where the view is wider than the track
+    beyond = 6 * step  # lines go on where the view is wider than the track
     meridians, parallels = _round(east, step, beyond), _round(north, step, beyond)
     grid = [[(x, -north[1] - beyond), (x, beyond - north[0])] for x in meridians]
     grid += [[(east[0] - beyond, -y), (east[1] + beyond, -y)] for y in parallels]
@@ -168,11 +168,9 @@ def send_arrows(
     arrows = [("N", 0.0, colours.TEXT)]
     if wind is not None and wind.steady:
         # drawn as it blows, said as it is called: by where it comes from
-        name = f"wind {wind.speed:.2g} m/s from {_bearing(wind.comes_from)}"
-        arrows.append((name, wind.comes_from + math.pi, colours.WIND))
+        arrows.append((wind.said, wind.comes_from + math.pi, colours.WIND))
     if current is not None:
-        name = f"current {current.speed:.2g} m/s to {_bearing(current.direction)}"
-        arrows.append((name, current.direction, colours.CURRENT))
+        arrows.append((surroundings.said(current), current.direction, colours.CURRENT))
     length = ARROW * frame.point
     shares = (0.08, 0.33, 0.62)  # of the width
     width = frame.whole_east[1] - frame.whole_east[0]
@@ -218,11 +216,6 @@ def _scale(frame: Frame) -> float:
     most = 130.0 * frame.point
     power = 10.0 ** math.floor(math.log10(most))
     return max(power * k for k in (1.0, 2.0, 5.0) if power * k <= most)
-
-
-def _bearing(angle: float) -> str:
-    """Three figures, clockwise from north, as bearings are written: 005°."""
-    return f"{round(math.degrees(angle)) % 360:03d}°"
 
 
 def send_key(

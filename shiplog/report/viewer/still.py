@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 WIDTH, ROW = 10.0, 3.9  # inches: the picture is wide, a voyage is tall
 KINDS = (".png", ".svg")
+SHAPE = 1.25  # width of a chart over its height, as the grid leaves it
 POINTS = 1500  # of a line: more than its width on a screen or a page
 MOST_HULLS = 24
 RULES: dict[str, Any] = {
@@ -99,9 +100,12 @@ def _draw_chart(axes: Axes, drawn: Drawn, voyage: str) -> None:
     rows = _of(drawn, drawn.measured, voyage)
     simulated = _of(drawn, drawn.simulated, voyage)
     east, north = trajectory.extent(replace(drawn, measured=rows, simulated=simulated), voyage)
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.set_xlim(*east)
-    axes.set_ylim(*north)
+    wide, tall = east[1] - east[0], north[1] - north[0]
+    wide, tall = max(wide, SHAPE * tall), max(tall, wide / SHAPE)
+    axes.set_aspect("equal", adjustable="box")
+    for limit, ends, length in ((axes.set_xlim, east, wide), (axes.set_ylim, north, tall)):
+        middle = (ends[0] + ends[1]) / 2.0
+        limit(middle - length / 2.0, middle + length / 2.0)
     seeds = display.drawn_seeds(drawn)
     of = colours.colours(drawn.models, drawn.extended)
     _line(axes, rows, "y0", "x0", colours.MEASURED, 2.0, "measured")
@@ -128,24 +132,26 @@ def _draw_chart(axes: Axes, drawn: Drawn, voyage: str) -> None:
 
 def _draw_arrows(axes: Axes, drawn: Drawn, voyage: str) -> None:
     """North, the mean true wind as it blows, a named current as it sets: above the tracks."""
+    from matplotlib.transforms import offset_copy
+
     arrows = [("N", 0.0, colours.TEXT)]
     rows = drawn.measured.filter(pl.col("voyage") == voyage)
     wind = surroundings.mean_true_wind(rows) if drawn.has_wind else None
     if wind is not None and wind.steady:
-        arrows.append((f"wind {wind.speed:.2g} m/s", wind.comes_from + math.pi, colours.WIND))
+        arrows.append((wind.said, wind.comes_from + math.pi, colours.WIND))
     if (current := drawn.current) is not None:
-        arrows.append((f"current {current.speed:.2g} m/s", current.direction, colours.CURRENT))
-    for number, (name, angle, colour) in enumerate(arrows):
+        arrows.append((surroundings.said(current), current.direction, colours.CURRENT))
+    for x, (name, angle, colour) in zip((0.05, 0.17, 0.62), arrows, strict=False):
         dx, dy = 11.0 * math.sin(angle), 11.0 * math.cos(angle)  # points
-        at = (0.06 + 0.28 * number, 0.93)
+        middle = offset_copy(axes.transAxes, axes.figure, x=dx, y=dy, units="points")
         axes.annotate(
-            "", xy=at, xycoords="axes fraction", xytext=(-2 * dx, -2 * dy),
+            "", xy=(x, 0.93), xycoords=middle, xytext=(-2.0 * dx, -2.0 * dy),
             textcoords="offset points", zorder=6,
             arrowprops={"arrowstyle": "-|>", "color": colours.web(colour), "linewidth": 1.3},
         )  # fmt: skip
         axes.annotate(
-            name, xy=at, xycoords="axes fraction", xytext=(8.0, -4.0), textcoords="offset points",
-            fontsize=7.5, color=colours.web(colour), zorder=6,
+            name, xy=(x, 0.93), xycoords="axes fraction", xytext=(13.0, -3.0),
+            textcoords="offset points", fontsize=7.5, color=colours.web(colour), zorder=6,
         )  # fmt: skip
 
 

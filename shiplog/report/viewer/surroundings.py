@@ -1,4 +1,4 @@
-"""What acts on the ship from outside, in one arrow a voyage: the mean true wind."""
+"""What acts on the ship from outside, an arrow each: the mean true wind, a named current."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import polars as pl
 
 from shiplog.nomenclature import frames
 from shiplog.report.viewer import display
+from shiplog.report.viewer.comparison_data import Current
 
 STEADY = 0.5  # of its mean speed that the mean wind vector keeps: below, it has no one direction
 
@@ -28,6 +29,21 @@ class Wind:
     @property
     def steady(self) -> bool:
         return self.steadiness >= STEADY
+
+    @property
+    def said(self) -> str:
+        """As winds are named: by where they come from."""
+        return f"wind {self.speed:.2g} m/s from {bearing(self.comes_from)}"
+
+
+def said(current: Current) -> str:
+    """As currents are named: by where they set."""
+    return f"current {current.speed:.2g} m/s to {bearing(current.direction)}"
+
+
+def bearing(angle: float) -> str:
+    """Three figures, clockwise from north, as bearings are written: 005°."""
+    return f"{round(math.degrees(angle)) % 360:03d}°"
 
 
 def mean_true_wind(rows: pl.DataFrame) -> Wind | None:

@@ -188,7 +188,14 @@ def _mark(recording: rr.RecordingStream, plot: Plot, seconds: float) -> None:
     at = np.array([seconds, seconds + 1e-3])  # of two values at one instant only one is drawn
     path = entity(*plot.origin, "moment")
     send_lines(
-        recording, path, at, ends, np.empty(0, dtype=np.intp), ["the moment"], colours.TEXT, 0.7
+        recording,
+        path,
+        at,
+        ends,
+        np.empty(0, dtype=np.intp),
+        ["the moment (black)"],
+        colours.TEXT,
+        0.7,
     )
 
 

@@ -296,15 +296,13 @@ def _send_chart(
     view: tuple[float, float],
 ) -> None:
     """What stands about the tracks, and what the site has."""
-    frame = framed(drawn, voyage, room, view)
+    frame = framed(drawn, voyage, room, view, drawn.moment)
     datum = drawn.datums.get(voyage)
     chart.send_grid(recording, voyage, frame, METRES[unit], datum)
-    here = drawn.moment is not None and drawn.moment.voyage == voyage
-    about = framed(drawn, voyage, room, view, drawn.moment) if here else frame
     rows = drawn.measured.filter(pl.col("voyage") == voyage)
     wind = surroundings.mean_true_wind(rows) if drawn.has_wind else None
-    chart.send_arrows(recording, voyage, about, unit, wind, drawn.current)
-    chart.send_key(recording, voyage, about, key(drawn))
+    chart.send_arrows(recording, voyage, frame, unit, wind, drawn.current)
+    chart.send_key(recording, voyage, frame, key(drawn))
     if drawn.banks:
         recording.log(
             entity("track", voyage, "banks"),
