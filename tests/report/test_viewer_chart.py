@@ -10,7 +10,7 @@ from recordings import entities, rows, scalars, views
 
 from shiplog.nomenclature import frames
 from shiplog.report import colours, viewer
-from shiplog.report.viewer import chart, display, recording, surroundings, tracking
+from shiplog.report.viewer import chart, display, recording, surroundings, tracking, trajectory
 from shiplog.report.viewer.comparison_data import Current
 
 DATUM = (34.82, 135.52)
@@ -168,3 +168,15 @@ def test_no_title_is_cut_on_a_screen_of_1920_points(compared):
     placed = replace(compared, datums={"harbour": DATUM})
     for view in views(recording.layout(display.drawn(placed))):
         assert len(view["name"]) * 7.5 < 0.26 * 1920 - 130 + 60, view["name"]
+
+
+def test_a_long_track_is_drawn_with_fewer_points_and_no_farther_off():
+    """A circle of 1 m in 40,000 points, thinned to a 2000th of the 2 m that it is wide."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 40_000)
+    circle = np.column_stack((np.cos(angle), np.sin(angle)))
+    (line,) = trajectory._lines(circle, np.empty(0, dtype=np.intp))
+    assert line[[0, -1]].tolist() == circle[[0, -1]].tolist()
+    between = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    assert between.max() <= 2.0 * 2.0 / 2000.0 and 6000 < len(line) < 6400  # 2π m by 1 mm
+    (short,) = trajectory._lines(circle[:20_000], np.empty(0, dtype=np.intp))
+    assert len(short) == 20_000

@@ -22,6 +22,7 @@ from shiplog.report.viewer.style import entity
 STATES = ("surge", "sway", "yaw_rate", "heading")  # drawn; where it was, the chart shows
 LEGEND_ROOM = 0.22  # of the voyage, free at the end of plots with a legend
 HALF_TURN = 180.0  # deg
+LONG = 10_000  # instants: more than ten for each point of the widest plot
 FITS_A_TITLE = 22  # letters after what stands in the longest one
 SPREAD = ("_lowest", "_highest")  # of all seeds
 CURVES: dict[str, tuple[str, ...]] = {  # column → its entity, in which the voyage comes second
@@ -370,7 +371,8 @@ def send_lines(
             colors=[colour] * count,
             widths=[width] * count,
             names=names,
-            aggregation_policy="Off",  # averaging over pixels would round off the peaks
+            # averaging over pixels would round off the peaks; of a long line each pixel's ends stay
+            aggregation_policy="Off" if len(time) <= LONG else "MinMax",
         ),
         static=True,
     )

@@ -28,6 +28,8 @@ NORTHWARD = pl.DataFrame({"x0": [0.0], "y0": [0.0], "heading": [0.0]})
 FARTHEST_M = 500.0  # m
 METRES = {"m": 1.0, "km": 1000.0}  # in a unit of the chart
 MEASURED = "measured"
+LONG = 20_000  # points of tracks, beyond which a software renderer takes many seconds
+COARSE = 1.0 / 2000.0  # of the chart: less than a point of a screen
 MOST_HULLS = 60  # on one track: more would hide the lines
 
 
@@ -373,7 +375,21 @@ def _lines(points: NDArray[np.float64], begins: NDArray[np.intp]) -> list[NDArra
     for piece in np.split(points, begins):
         valid = np.isfinite(piece[:, 0] + piece[:, 1])
         lines += [part for part in _runs(piece, valid) if len(part) > 1]
-    return lines
+    if len(points) <= LONG:
+        return lines
+    known = points[np.isfinite(points).all(axis=1)]
+    step = COARSE * float(np.ptp(known, axis=0).max())
+    return [_coarser(line, step) for line in lines]
+
+
+def _coarser(line: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+    """A line with fewer points, of each `step` along it the first: none is farther off."""
+    if step == 0.0:
+        return line[[0, -1]]
+    sailed = np.cumsum(np.linalg.norm(np.diff(line, axis=0, prepend=line[:1]), axis=1))
+    keep = np.diff(np.floor(sailed / step), prepend=-1.0) > 0
+    keep[-1] = True
+    return line[keep]
 
 
 def _runs(piece: NDArray[np.float64], valid: NDArray[np.bool_]) -> list[NDArray[np.float64]]:
