@@ -53,10 +53,9 @@ def compare(
             "--web serves the recording, and --save writes it and opens nothing.",
             hint="leave one of them out.",
         )
-    if save is not None:
-        saving.check(save)
     check_runs(runs, store, voyages, cause)
     to = check_file(save or runs[0] / "compare.rrd", "--save")
+    saving.check(to)
     from shiplog.commands.bars import loading
 
     with loading():

@@ -245,7 +245,7 @@ def _send_window_starts(
         rr.Points2D(
             points[np.isfinite(points).all(axis=1)],
             colors=colours.MEASURED,
-            radii=rr.Radius.ui_points(3.5),
+            radii=rr.Radius.ui_points(3.5 if len(points) <= MOST_HULLS else 1.5),
             draw_order=25.0,
         ),
         static=True,
