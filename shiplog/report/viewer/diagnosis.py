@@ -195,7 +195,7 @@ def _positions(picture: Pictured, voyage: str) -> rrb.View:
         name="position error in each held-out window [m]",
         axis_x=_whole_voyage(picture, voyage),
         axis_y=rrb.ScalarAxis(range=tracking.position_range(errors, measured)),
-        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=True),
+        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=False),
         background=style.plot_background(),
     )
 
