@@ -69,7 +69,9 @@ def test_arrows_point_to_where_wind_and_current_go(compared, tmp_path):
     assert water / length == pytest.approx((0.0, 1.0), abs=1e-6)
     labels = rows(path, "/track/harbour/arrows/labels", "Points2D:labels")["Points2D:labels"][0]
     assert labels.to_list()[:3] == ["N", "wind 6 m/s from 090°", "current 0.25 m/s to 180°"]
-    assert found["Arrows2D:colors"][0].to_list() == [0x1E1E1EFF, 0x882255FF, 0x332288FF]
+    assert found["Arrows2D:colors"][0].to_list() == [
+        int.from_bytes(bytes(c)) for c in (colours.TEXT, colours.WIND, colours.CURRENT)
+    ]
 
 
 def test_the_scale_bar_is_as_long_as_it_says(saved):

@@ -49,7 +49,7 @@ def test_each_part_is_a_line_with_its_force(with_forces, tmp_path):
         assert np.delete(values, 40) == pytest.approx(value)
     text = entities(rrd)
     assert "network" not in text.replace(r"network\ fast", "") and "/force/harbour" not in text
-    for part, colour in (("terms/hull", 0x465C78FF), ("sum/total", 0x191919FF)):  # slate, dark
+    for part, colour in (("terms/hull", 0x55739BFF), ("sum/total", 0x191919FF)):  # slate, dark
         table = rows(rrd, rf"/force/open\ sea/yaw/{part}", "SeriesLines:colors")
         assert table["SeriesLines:colors"][0].to_list() == [colour]
 

@@ -54,7 +54,7 @@ def send(recording: rr.RecordingStream, drawn: Drawn) -> None:
                 display.column(lines, "time"),
                 display.column(lines, axis)[:, None] / factor,
                 display.pieces(lines),
-                [part],
+                [f"{part} (black)" if whole else part],
                 of[part],
                 2.5 if whole else 1.5,
             )

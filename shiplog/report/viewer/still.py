@@ -26,7 +26,7 @@ KINDS = (".png", ".svg")
 SHAPE = 1.25  # width of a chart over its height, as the grid leaves it
 POINTS = 1500  # of a line: more than its width on a screen or a page
 MOST_HULLS = 24
-RULES: dict[str, Any] = {
+RULES: dict[Any, Any] = {
     "font.size": 8.5, "font.family": "sans-serif", "font.sans-serif": ["DejaVu Sans"],
     "axes.linewidth": 0.6, "axes.titlesize": 9.0, "axes.titlelocation": "left",
     "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False,
@@ -143,7 +143,7 @@ def _draw_arrows(axes: Axes, drawn: Drawn, voyage: str) -> None:
         arrows.append((surroundings.said(current), current.direction, colours.CURRENT))
     for x, (name, angle, colour) in zip((0.05, 0.17, 0.62), arrows, strict=False):
         dx, dy = 11.0 * math.sin(angle), 11.0 * math.cos(angle)  # points
-        middle = offset_copy(axes.transAxes, axes.figure, x=dx, y=dy, units="points")
+        middle = offset_copy(axes.transAxes, axes.get_figure(root=True), x=dx, y=dy, units="points")
         axes.annotate(
             "", xy=(x, 0.93), xycoords=middle, xytext=(-2.0 * dx, -2.0 * dy),
             textcoords="offset points", zorder=6,

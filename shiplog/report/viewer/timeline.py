@@ -31,6 +31,10 @@ CURVES: dict[str, tuple[str, ...]] = {  # column → its entity, in which the vo
 }  # fmt: skip
 
 
+# Kind, rows, suffixes of its columns, names, colour, width.
+Lines = tuple[str, pl.DataFrame, tuple[str, ...], list[str], colours.Colour, float]
+
+
 @dataclass(frozen=True)
 class Plot:
     """One axis along time: its title, its entity, from where to where it shows."""
@@ -287,7 +291,7 @@ def _send_simulated(
         bold = _bold(simulated, model, seeds[model])
         spread = _spread(rollouts) if rollouts["seed"].n_unique() > 1 else None
         for name, parent in CURVES.items():
-            lines = [("simulated", bold, ("",), [model], colour, 1.25)]
+            lines: list[Lines] = [("simulated", bold, ("",), [model], colour, 1.25)]
             if display.has_band(bold, name):  # what the model itself doubts, not how training went
                 lines.append(("band", bold, BAND, ["90 % band"] * 2, colours.faded(colour), 0.7))
             elif spread is not None:

@@ -133,7 +133,7 @@ class Page:
         self._server.daemon_threads = True
         self._server.page = self  # type: ignore[attr-defined]
         self.recording = recording
-        self.files = {
+        self.files: dict[str, tuple[str, bytes]] = {
             "": ("text/html; charset=utf-8", PAGE.encode()),
             "page.css": ("text/css", STYLE.encode()),
             "start.js": ("text/javascript", START.encode()),
@@ -170,7 +170,8 @@ class _Handler(BaseHTTPRequestHandler):
         elif name == RECORDING:
             self._recording(page.recording)
         elif name in page.files:
-            self._answer(HTTPStatus.OK, *page.files[name])
+            kind, content = page.files[name]
+            self._answer(HTTPStatus.OK, kind, content)
         else:
             self._answer(HTTPStatus.NOT_FOUND, "text/plain", b"not here\n")
 
