@@ -11,7 +11,7 @@ from recordings import SECONDS, rows, scalars, views
 
 from shiplog.exceptions import ShiplogError
 from shiplog.report import colours, viewer
-from shiplog.report.viewer import display, recording, saving, still, timeline
+from shiplog.report.viewer import control, display, native, recording, saving, still, timeline
 from shiplog.report.viewer.comparison_data import Moment
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -86,6 +86,32 @@ def test_the_viewer_stands_at_the_moment(at_60, tmp_path, no_viewer):
     times = [r.current_time for r in state.recordings if r.timelines]
     assert times == [60 * 10**9]
     assert not [report for view in state.views for report in view.reports]
+
+
+@pytest.mark.viewer
+def test_a_viewer_that_was_opened_is_told_where_to_stand(at_60, tmp_path, no_viewer):
+    """As the one with a window is, which needs a display."""
+    from rerun.experimental import ViewerClient
+
+    path, port = tmp_path / "moment.rrd", native.free_port()
+    viewer.save(at_60, path)
+    with (tmp_path / "output").open("w+b") as output:
+        process = native.start(["--headless", str(path), "--port", str(port)], output, True)
+        try:
+            native.wait_for(process, (port,), control.LOAD_TIMEOUT_S)
+        except TimeoutError:
+            no_viewer(f"no headless viewer here: {native.last_words(output)}")
+        try:
+            native._put_cursor(port, 60.0)
+            state = ViewerClient(control.address(native.HOST, port)).get_state()
+        finally:
+            native.stop(process)
+    assert [r.current_time for r in state.recordings if r.timelines] == [60 * 10**9]
+
+
+def test_without_a_viewer_no_cursor_is_set_and_a_warning_says_so(caplog):
+    native._put_cursor(native.free_port(), 60.0)
+    assert "the viewer's cursor was not set to 60 s" in caplog.text
 
 
 # --- what is written ------------------------------------------------------------------------------

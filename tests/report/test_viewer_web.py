@@ -107,6 +107,8 @@ def test_a_real_browser_shows_the_recording_and_asks_no_other_host(served, tmp_p
         browser.run("fetch('http://elsewhere.invalid/').catch(() => { window.refused = true; })")
         browser.wait("return window.refused")
         assert browser.run("return document.documentElement.dataset.shiplog") == "shown"
+        state = bytes(browser.run("return Array.from(window.viewer.viewer_state())"))
+        assert web_page._varint(120 * 10**9) in state  # where the cursor stands
         browser.picture(tmp_path / "page.png")
         browser.open(other)
         browser.wait("return document.readyState == 'complete'")

@@ -132,8 +132,11 @@ def _draw_chart(axes: Axes, drawn: Drawn, voyage: str) -> None:
 
 def _draw_arrows(axes: Axes, drawn: Drawn, voyage: str) -> None:
     """North, the mean true wind as it blows, a named current as it sets: above the tracks."""
+    from matplotlib.figure import Figure
     from matplotlib.transforms import offset_copy
 
+    figure = axes.get_figure()
+    assert isinstance(figure, Figure)
     arrows = [("N", 0.0, colours.TEXT)]
     rows = drawn.measured.filter(pl.col("voyage") == voyage)
     wind = surroundings.mean_true_wind(rows) if drawn.has_wind else None
@@ -143,7 +146,7 @@ def _draw_arrows(axes: Axes, drawn: Drawn, voyage: str) -> None:
         arrows.append((surroundings.said(current), current.direction, colours.CURRENT))
     for x, (name, angle, colour) in zip((0.05, 0.17, 0.62), arrows, strict=False):
         dx, dy = 11.0 * math.sin(angle), 11.0 * math.cos(angle)  # points
-        middle = offset_copy(axes.transAxes, axes.get_figure(root=True), x=dx, y=dy, units="points")
+        middle = offset_copy(axes.transAxes, figure, x=dx, y=dy, units="points")
         axes.annotate(
             "", xy=(x, 0.93), xycoords=middle, xytext=(-2.0 * dx, -2.0 * dy),
             textcoords="offset points", zorder=6,

@@ -85,6 +85,7 @@ async function start() {
   const moment = await (await fetch("moment.json")).json();
   await wasm_bindgen({ module_or_path: fetch("re_viewer_bg.wasm") });
   const handle = new wasm_bindgen.WebHandle(settings);
+  window.viewer = handle;
   await handle.start(document.getElementById("viewer"));
   document.getElementById("message").remove();
   if (moment !== null) {
