@@ -1,8 +1,10 @@
 """Recordings are written whole, and the viewer shows them, on this machine only."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
+import polars as pl
 import pytest
 
 from shiplog.exceptions import ShiplogError
@@ -73,6 +75,21 @@ def test_a_server_that_does_not_start_names_a_viewer_of_this_machine_only(saved,
     with pytest.raises(ShiplogError, match="did not start") as output:
         viewer.serve(saved, port=0)
     assert "`rerun --bind 127.0.0.1 FILE.rrd`" in output.value.hint
+
+
+@pytest.mark.viewer
+def test_a_letter_that_the_font_lacks_is_said_in_a_sentence(compared, tmp_path, no_viewer):
+    from shiplog.report.viewer.screenshot import screenshot
+
+    named = compared.measured.with_columns(pl.col("voyage").replace("harbour", "船"))
+    path = tmp_path / "ship.rrd"
+    viewer.save(replace(compared, measured=named), path)
+    with pytest.raises(ShiplogError) as error:
+        screenshot(path, tmp_path / "ship.png")
+    if "did not start" in error.value.message:
+        no_viewer(f"no headless viewer here: {error.value.message}")
+    assert "has no letter '船'" in error.value.message
+    assert not (tmp_path / "ship.png").exists()
 
 
 @pytest.mark.viewer

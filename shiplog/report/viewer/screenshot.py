@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import IO
 
 from rerun.experimental import ViewerClient, ViewerState
 
@@ -49,9 +51,22 @@ def headless() -> Iterator[ViewerClient]:
             native.wait_for(process, (port,), control.LOAD_TIMEOUT_S)
             yield ViewerClient(control.address(native.HOST, port))
         except (TimeoutError, ConnectionError):  # it never listened, or ended when it had to draw
-            raise ShiplogError(
-                f"The headless viewer did not start: {native.last_words(output)}",
-                hint="it needs a Vulkan driver, such as the package mesa-vulkan-drivers.",
-            ) from None
+            raise _why(output) from None
         finally:
             native.stop(process)
+
+
+def _why(output: IO[bytes]) -> ShiplogError:
+    """What ended the viewer. Without a window it ends at a letter that its font lacks; with one,
+    and in a browser, it draws a box."""
+    output.seek(0)
+    said = output.read().decode(errors="replace")
+    if lacking := re.search(r'No glyph for "(.+?)"', said):
+        return ShiplogError(
+            f"The headless viewer has no letter {lacking[1]!r}, which a name or text has.",
+            hint="open the recording in the viewer, which draws a box instead, or rename it.",
+        )
+    return ShiplogError(
+        f"The headless viewer did not start: {native.last_words(output)}",
+        hint="it needs a Vulkan driver, such as the package mesa-vulkan-drivers.",
+    )
