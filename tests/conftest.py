@@ -26,6 +26,7 @@ jax.config.update("jax_enable_x64", True)
 LONGEST = (
     "commands/test_real_logs.py", "commands/test_demo.py", "diagnosis/test_whole_way.py",
     "diagnosis/test_whole_way_trials.py", "diagnosis/test_network_base.py",
+    "commands/test_gate_seasons.py",
     "commands/test_tour.py", "commands/test_paper.py", "commands/test_train_physics.py",
     "voyages/test_sensor_consistency.py", "cli/test_endings.py",
     "diagnosis/test_without_wind_sensor.py", "experiments/test_simulated_effects.py",

@@ -34,14 +34,14 @@ ROOMS = {
     ),
     "training": ("settings", "network", "physics", "runs"),
     "diagnosis": ("linear", "noise", "nominal", "trial", "hypotheses", "verdict", "residual"),
-    "report": ("evaluation", "viewer", "diagnosis", "paper"),
+    "report": ("evaluation", "figures", "viewer", "diagnosis", "paper", "page", "gate"),
 }  # fmt: skip
 LEVEL = {name: level for level, name in enumerate(ROWS)}
 SOURCES = sorted((ROOT / "shiplog").rglob("*.py"))
 ONLY = {  # a library, and the packages and modules that may import it
     "mcap": {"logs"}, "mcap_protobuf": {"logs"}, "mcap_ros2": {"logs"}, "pynmea2": {"logs"},
     "rosbags": {"logs"}, "rerun": {"logs", "report"}, "ray": {"training"},
-    "matplotlib": {"report"}, "typer": {"cli"}, "pickle": set(),
+    "matplotlib": {"report"}, "jinja2": {"report"}, "typer": {"cli"}, "pickle": set(),
     "torch": {"training", "shiplog.models.feedforward"},
 }  # fmt: skip
 
@@ -146,7 +146,7 @@ def test_what_runs_no_network_does_not_load_torch():
     """A diagnosis, an evaluation and a training of an MMG; and what they leave open until it is
     known which model a run is of."""
     program = (
-        "import sys; from shiplog.commands import api, diagnose, evaluate, identify, train, "
-        "train_again; sys.exit('torch' in sys.modules)"
+        "import sys; from shiplog.commands import api, diagnose, evaluate, gate, identify, "
+        "train, train_again; sys.exit('torch' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", program], cwd=ROOT, check=False).returncode == 0

@@ -14,9 +14,11 @@ from shiplog.cli import (
     demo,
     diagnose,
     evaluate,
+    gate,
     ingest,
     paper,
     profile,
+    report,
     train,
     voyages,
 )
@@ -33,6 +35,8 @@ COMMANDS = (
     evaluate.evaluate,
     compare.compare,
     diagnose.diagnose,
+    report.report,
+    gate.gate,
     cache.cache,
 )
 
@@ -44,7 +48,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Learn a ship's dynamic model from its logs, and see where it fails.",
     epilog="Exit codes: 0 done; 1 the input is at fault; 2 wrong usage; 3 done, but something was "
-    "lost or refused.",
+    "lost or refused; 4 a limit of `gate` is broken.",
 )
 
 

@@ -8,7 +8,15 @@ from typing import Annotated
 import typer
 
 from shiplog.cli.inputs import check_runs
-from shiplog.cli.options import STORE, Causes, JsonOption, StoreOption, TestVoyages
+from shiplog.cli.options import (
+    STORE,
+    Causes,
+    JsonOption,
+    ReportOption,
+    StoreOption,
+    TestVoyages,
+    page_file,
+)
 from shiplog.cli.output import answer, leave_lost, show
 from shiplog.exceptions import ShiplogError, UsageError
 
@@ -20,8 +28,8 @@ def compare(
     save: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE.rrd|png|svg",
-            help="Write the recording, or a picture, here and open nothing.",
+            metavar="FILE.rrd|png|svg|html",
+            help="Write the recording, a picture or the page here and open nothing.",
         ),
     ] = None,
     at: Annotated[
@@ -37,6 +45,7 @@ def compare(
         typer.Option("--web", help="Show it in a browser, at 127.0.0.1, instead of the viewer."),
     ] = False,
     cause: Causes = None,
+    report: ReportOption = None,
     json_to: JsonOption = None,
 ) -> None:
     """Measured against simulated in Rerun.
@@ -54,17 +63,18 @@ def compare(
             hint="leave one of them out.",
         )
     check_runs(runs, store, voyages, cause)
+    page = page_file(report)
     to = check_file(save or runs[0] / "compare.rrd", "--save")
     saving.check(to)
     from shiplog.commands.bars import loading
 
     with loading():
-        from shiplog.commands.evaluate import compare_runs
+        from shiplog.commands.evaluate import compare_runs, keep_pages
     from shiplog.voyages.store.store import Store
 
     result = compare_runs(runs, Store(store), voyages or [], to, cause or [], at)
     answer(result, json_to)
-    lost = list(result.lost)
+    lost = [*result.lost, *keep_pages(result.evaluation, Store(store), page)]
     if save is None and result.recording is not None:
         try:
             show(result.recording, web, result.moment and result.moment.seconds)

@@ -8,7 +8,15 @@ from typing import Annotated
 import typer
 
 from shiplog.cli.inputs import check_runs
-from shiplog.cli.options import STORE, Causes, JsonOption, StoreOption, TestVoyages
+from shiplog.cli.options import (
+    STORE,
+    Causes,
+    JsonOption,
+    ReportOption,
+    StoreOption,
+    TestVoyages,
+    page_file,
+)
 from shiplog.cli.output import LOST, answer, leave_lost
 
 
@@ -17,6 +25,7 @@ def evaluate(
     voyages: TestVoyages = None,
     store: StoreOption = STORE,
     cause: Causes = None,
+    report: ReportOption = None,
     json_to: JsonOption = None,
 ) -> None:
     """How far off a model is on measured voyages.
@@ -26,14 +35,15 @@ def evaluate(
     Example: shiplog evaluate runs/ref --voyages voyage_6
     """
     check_runs([run], store, voyages, cause)
+    page = page_file(report)
     from shiplog.commands.bars import loading
 
     with loading():
-        from shiplog.commands.evaluate import evaluate_runs, save
+        from shiplog.commands.evaluate import evaluate_runs, keep_pages, save
     from shiplog.voyages.store.store import Store
 
     found = evaluate_runs([run], Store(store), voyages or [], cause or [])
     answer(found, json_to)
-    leave_lost(save(found))
+    leave_lost([*save(found), *keep_pages(found, Store(store), page)])
     if set(found.too_short) & set(voyages or ()):  # by its own name, and the answer says so
         raise typer.Exit(LOST)

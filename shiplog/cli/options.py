@@ -11,6 +11,15 @@ from shiplog.exceptions import UsageError
 from shiplog.nomenclature.channels import LEAST_WINDOW
 
 
+def page_file(report: Path | None) -> Path | None:
+    """Whether --report can be written is known before the work."""
+    if report is None:
+        return None
+    from shiplog.machine.paths import check_file
+
+    return check_file(report, "--report")
+
+
 def _ask_json(json_to: str | None) -> str | None:
     """Whether --json can be written is known before the work."""
     if json_to is None or json_to == "-":
@@ -40,6 +49,10 @@ JsonOption = Annotated[
         help="Write the answer as JSON into this file; - is stdout.",
         callback=_ask_json,
     ),
+]
+ReportOption = Annotated[
+    Path | None,
+    typer.Option("--report", metavar="FILE", help="Also write one page with pictures: FILE.html."),
 ]
 CHOSEN = "Names or shell patterns, several times; unless given,"
 Voyages = Annotated[list[str] | None, typer.Option("--voyages", help=f"{CHOSEN} all.")]

@@ -13,12 +13,14 @@ from shiplog.cli.options import (
     Device,
     Epochs,
     JsonOption,
+    ReportOption,
     Seeds,
     StoreOption,
     TrainingVoyages,
     Validation,
     Width,
     Window,
+    page_file,
 )
 from shiplog.cli.output import LOST, answer
 from shiplog.exceptions import UsageError
@@ -47,6 +49,7 @@ def paper(
         str | None, typer.Option(metavar="ADDRESS", help="Train on this Ray cluster instead.")
     ] = None,
     store: StoreOption = STORE,
+    report: ReportOption = None,
     json_to: JsonOption = None,
 ) -> None:
     """The published experiment: eight window sets, ten seeds each.
@@ -64,6 +67,7 @@ def paper(
     for name in chosen:
         TrainOptions(data=name, recipe=recipe, device=device).check()
     _refuse_together(device, jobs, ray)
+    page = page_file(report)
     check_writable(out, "--out")
     check_voyages(store, voyages, validation)
     from shiplog.commands.bars import loading
@@ -85,6 +89,7 @@ def paper(
         jobs=jobs,
         ray=ray,
         device=device,
+        page=page,
     )
     answer(found, json_to)
     if found.json["failures"]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -28,18 +28,23 @@ from shiplog.diagnosis.verdict import result as decisions
 from shiplog.diagnosis.verdict.held_out import HeldOut
 from shiplog.exceptions import ShiplogError
 from shiplog.machine import files
-from shiplog.machine.paths import check_diagnosis
+from shiplog.machine.paths import check_diagnosis, refuse_other_answer
 from shiplog.machine.unexpected import unexpected
 from shiplog.models.causes import Cause, user
-from shiplog.report.diagnosis import answer, diagnosis_pictures, page
+from shiplog.report import viewer
+from shiplog.report.diagnosis import answer, diagnosis_pictures, page, picture_tables
 from shiplog.report.diagnosis.answer import Context
-from shiplog.report.diagnosis.diagnosis import RECORDING, Diagnosis
-from shiplog.report.evaluation.text_table import inert
+from shiplog.report.diagnosis.diagnosis import PAGE, RECORDING, Diagnosis
+from shiplog.report.diagnosis.sections import subject
+from shiplog.report.figures import picture_data, voyage_tables
+from shiplog.report.page import html
+from shiplog.report.page.diagnosis import page as diagnosis_page
+from shiplog.report.page.diagnosis.source import PROVENANCE, VERDICT
 from shiplog.ship_profile.profile import Profile
 from shiplog.simulation.extended_simulator import ExtendedSimulator
 from shiplog.training.runs import extension_file, load_model
 from shiplog.training.runs.load_model import Run
-from shiplog.training.runs.provenance import provenance
+from shiplog.training.runs.provenance import portable, provenance
 from shiplog.training.runs.run_checks import refuse_other_ship
 from shiplog.voyages.rows.recording import Record
 from shiplog.voyages.store import contradicted, parts
@@ -79,6 +84,8 @@ def diagnose_run(
     names = trial_voyages.voyages_of(run, store, voyages)
     profile = store.profile(names)
     refuse_other_ship(run, profile)
+    hashes = store.hashes(names)
+    refuse_other_answer(out, run.name, hashes)
     recorded = trial_voyages.record_of(store, names, profile)
     before_effect = not parts.overlapping(names, run.trained_on) and not run.given
     nominal = _nominal(run, store, profile) if before_effect else None
@@ -97,9 +104,12 @@ def diagnose_run(
         done = _decided(campaign, out, causes)
     else:
         done = Diagnosis(answer.too_little(run, recorded, before_effect), out)
-    _save(done, store, names, began)
-    datums = {name: found for name in names if (found := store.datum(name)) is not None}
-    done = _drawn(replace(done, datums=datums))
+    seconds = voyage_tables.Seconds.of(store, names, profile)
+    about = subject.of(run, done.verdict.made, profile, seconds.voyages)
+    done = replace(done, verdict=replace(done.verdict, subject=about))
+    _save(done, hashes, began, {"run_path": run_path, "store_path": store.path})
+    datums = {name: found for name in names if (found := store.origin(name)[1]) is not None}
+    done = _drawn(replace(done, datums=datums), run, seconds)
     if extend is None:
         return done
     if done.after is None:
@@ -231,17 +241,18 @@ def _nominal_windows(of: Campaigns) -> Windows | None:
     return trial_voyages.windows_of(of.run, of.store, there, of.profile)
 
 
-def _write(done: Diagnosis) -> None:
-    done.folder.mkdir(parents=True, exist_ok=True)
-    files.write_text(done.report, inert(page.markdown(done.verdict)))
-    files.write_json(done.folder / "verdict.json", done.verdict.as_json())
-
-
-def _save(done: Diagnosis, store: Store, names: Sequence[str], began: float) -> None:
+def _save(
+    done: Diagnosis, hashes: Mapping[str, str | None], began: float, places: Mapping[str, Path]
+) -> None:
     """Report, verdict and provenance; pictures of an earlier diagnosis do not stay."""
-    _write(done)
-    files.remove(done.folder / RECORDING)
-    files.write_json(done.folder / "provenance.json", provenance(store.hashes(names), began))
+    done.folder.mkdir(parents=True, exist_ok=True)
+    files.write_text(done.report, page.written(done.verdict))
+    files.write_json(done.folder / VERDICT, done.verdict.as_json())
+    for name in (RECORDING, PAGE):
+        files.remove(done.folder / name)
+    portable_places = {key: portable([str(path)])[0] for key, path in places.items()}
+    facts = provenance(hashes, began) | portable_places
+    files.write_json(done.folder / PROVENANCE, facts)
 
 
 def _extended(
@@ -251,12 +262,16 @@ def _extended(
     return load_model.load(extension_file.extend(run, out, after, own), causes)
 
 
-def _drawn(done: Diagnosis) -> Diagnosis:
-    """The pictures, once the verdict is written. Where they fail, the answer says why."""
-    if done.recording is None:
-        return done
+def _drawn(done: Diagnosis, run: Run, seconds: voyage_tables.Seconds) -> Diagnosis:
+    """The pictures and the page, once the verdict is written. Where they fail, the answer says
+    why."""
     try:
-        diagnosis_pictures.save(done, done.recording)
+        exhibit = None if done.decision is None else diagnosis_pictures.exhibit(done)
+        data = picture_tables.of_diagnosis(done, exhibit, run, seconds)
+        picture_data.save(data, done.folder / picture_data.FOLDER)
+        if exhibit is not None:
+            viewer.save_diagnosis(exhibit, done.folder / RECORDING)
+        html.write(diagnosis_page.of_folder(done.folder), done.folder / PAGE)
     except (KeyboardInterrupt, SystemExit):
         raise
     except BaseException as error:  # a panic of polars is no Exception

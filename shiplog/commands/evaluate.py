@@ -104,7 +104,7 @@ def evaluate_runs(
         inside=_inside(scored, bands, cut),
         forces=_forces(opened, rows),
         contradicted=contradicted.of(store, names),
-        datums={name: found for name in names if (found := store.datum(name)) is not None},
+        datums={name: found for name in names if (found := store.origin(name)[1]) is not None},
     )
 
 
@@ -118,6 +118,36 @@ def save(evaluation: Evaluation) -> tuple[ShiplogError, ...]:
             run.save_evaluation(evaluation.errors.filter(mine), evaluation.rollouts.filter(mine))
         except OSError as error:
             refused.append(unexpected(error))
+    return tuple(refused)
+
+
+def _write_page(evaluation: Evaluation, store: Store, path: Path) -> None:
+    from shiplog.report.page import html
+    from shiplog.report.page.evaluation import page as evaluation_page
+    from shiplog.report.page.evaluation import source as sources
+
+    html.write(evaluation_page.of_source(sources.of_evaluation(evaluation, store)), path)
+
+
+def keep_pages(evaluation: Evaluation, store: Store, page: Path | None) -> tuple[ShiplogError, ...]:
+    """What `shiplog report RUN` makes its page of, in the folder of a run that was evaluated alone;
+    and the page, where one is asked for. Returns what could not be written."""
+    from shiplog.report.page import html
+    from shiplog.report.page.evaluation import page as evaluation_page
+    from shiplog.report.page.evaluation import source as sources
+
+    refused = []
+    source = sources.of_evaluation(evaluation, store)
+    if len(evaluation.runs) == 1:
+        try:
+            sources.save(source, evaluation.runs[0].path / sources.FOLDER)
+        except OSError as error:
+            refused.append(unexpected(error))
+    if page is not None:
+        try:
+            html.write(evaluation_page.of_source(source), page)
+        except ShiplogError as error:
+            refused.append(error)
     return tuple(refused)
 
 
@@ -224,7 +254,10 @@ def compare_runs(
     saved: Path | None = save_to or found.runs[0].path / "compare.rrd"
     title = f"{found.runs[0].profile.ship.name}: {listed(found.voyages, most=3)}"
     try:
-        saving.write(comparison(found, title, opened), saved)
+        if saved.suffix.lower() == saving.PAGE:
+            _write_page(found, store, saved)
+        else:
+            saving.write(comparison(found, title, opened), saved)
     except ShiplogError as error:
         saved, lost = None, (*lost, error)
     return Comparison(found, saved, lost, opened)

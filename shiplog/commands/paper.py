@@ -19,6 +19,7 @@ from shiplog.nomenclature.contract import CONTRACT
 from shiplog.nomenclature.numbers import counted
 from shiplog.report import viewer
 from shiplog.report.evaluation.text_table import inert
+from shiplog.report.page.paper import page as paper_page
 from shiplog.report.paper import figures, report, sets, statements
 from shiplog.report.paper.report import Results
 from shiplog.report.result import Answer
@@ -79,6 +80,7 @@ def paper_command(
     jobs: int | None,
     ray: str | None,
     device: str,
+    page: Path | None = None,
 ) -> Answer:
     """`shiplog paper`: every set, every seed, then tables and figures. Interrupted, the same
     command goes on. Raises ShiplogError."""
@@ -99,6 +101,7 @@ def paper_command(
     lines = write(results, chosen, store, out)
     content = {
         "contract": CONTRACT,
+        "ship": next(iter(finished.values())).profile.ship.name,
         "folder": str(out),
         "recording": str(out / "paper.rrd"),
         "recipe": recipe,
@@ -109,7 +112,18 @@ def paper_command(
         "floors": results.evaluation.means,
         "failures": failures,
     }
+    files.write_json(out / paper_page.ANSWER, content)
+    lines += _paged(out, page)
     return Answer(lines, content)
+
+
+def _paged(out: Path, page: Path | None) -> list[str]:
+    """The page, where one is asked for."""
+    if page is None:
+        return []
+    from shiplog.report.page import html
+
+    return ["", f"Page: {html.write(paper_page.of_folder(out), page)}"]
 
 
 def choose_voyages(

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import fnmatch
+import json
 import os
-from collections.abc import Sequence, Sized
+from collections.abc import Mapping, Sequence, Sized
 from pathlib import Path
 
-from shiplog.exceptions import LogUnreadable, RunError, ShiplogError, UsageError
+from shiplog.exceptions import LogUnreadable, RunError, ShiplogError, UsageError, listed
 from shiplog.machine import files
 
 BEGUN = ".partial"  # end of a run's name until it is finished
@@ -160,6 +161,25 @@ def check_diagnosis(out: Path, extend: Path | None) -> None:
             f"--extend {extend} is a folder for a run, and --out {out} for a report in it.",
             hint="give --extend a folder of its own, such as runs/extended.",
         )
+
+
+def refuse_other_answer(out: Path, run: str, logs: Mapping[str, str | None]) -> None:
+    """Raises RunError where --out holds the verdict on another run, or on other voyages: the same
+    question may be asked again.
+
+    logs   voyage → SHA-256 of its log
+    """
+    try:
+        was = json.loads((out / "verdict.json").read_text(encoding="utf-8"))["base"]["run"]
+        before = json.loads((out / "provenance.json").read_text(encoding="utf-8"))["logs_sha256"]
+    except (OSError, ValueError, KeyError, TypeError):  # none is there, or none that was finished
+        return
+    if (was, before) == (run, dict(logs)):
+        return
+    raise RunError(
+        f"--out {out} holds another answer: of {was} on {listed(map(str, before), most=3)}.",
+        hint="choose another --out, or remove that folder.",
+    )
 
 
 def refuse_same_names(runs: Sequence[Path]) -> None:

@@ -166,7 +166,7 @@ def test_names_of_strangers_are_drawn_as_they_are(compared, tmp_path):
 def test_another_ending_is_refused_before_the_work(name, compared, tmp_path):
     with pytest.raises(ShiplogError, match="says of no kind of file") as refused:
         saving.write(compared, tmp_path / name)
-    assert ".rrd, .png, .svg" in refused.value.hint
+    assert ".rrd, .png, .svg, .html" in refused.value.hint
     assert not list(tmp_path.iterdir())
 
 

@@ -127,6 +127,7 @@ class Cause:
     kind: ClassVar[str]  # environment, ship or sensor
     story: ClassVar[str]
     equation: ClassVar[str]  # what it adds to the equations of motion or of the instruments
+    remedy: ClassVar[str] = ""  # what its owner is to do when it is named, in a sentence or two
     parameters: ClassVar[tuple[Parameter, ...]]
     needs: ClassVar[tuple[str, ...]] = ()  # words of NEEDS, without which it cannot be tested
     separated_by: ClassVar[Mapping[str, str]] = {}  # other cause → manoeuvre that tells them apart

@@ -28,6 +28,10 @@ class Current(Cause):
     kind = "environment"
     story = "The water moves with a steady current."
     equation = "ν̇ = f(ν - RᵀV, u, ω) + d(RᵀV)/dt,  V = ({north:+.3f}, {east:+.3f}) m/s"
+    remedy = (
+        "Give the simulation this current on these voyages. It is the water and not the "
+        "ship: do not change the model for other days."
+    )
     parameters = (
         Parameter("north", "m/s", 0.25, 0.015, of="speed"),
         Parameter("east", "m/s", 0.25, 0.015, of="speed"),
@@ -82,6 +86,10 @@ class WindForce(Cause):
     needs = ("wind",)
     story = "The wind force differs from the model's."
     equation = "X_A·{surge_factor:.2f}, Y_A·{sway_factor:.2f}, N_A·{yaw_factor:.2f}"
+    remedy = (
+        "Use the extended model in wind like this, and look for what changed the "
+        "windage: cargo, containers, a raised structure."
+    )
     parameters = (
         Parameter("surge_factor", "1", 0.3, 0.03, low=-1.0),
         Parameter("sway_factor", "1", 0.3, 0.03, low=-1.0),
@@ -203,6 +211,10 @@ class ShallowWater(Cause):
     kind = "environment"
     story = "The water is shallow in places."
     equation = "X₀, Y_v, N_v, N_r, C_D, m_y, J grow with a map of depth; at most {strength:.2f}"
+    remedy = (
+        "Use the extended model where it is as shallow as here. In deep water the model "
+        "before it stands."
+    )
     parameters = ()
     separated_by = {"cross_flow_drag": "the same manoeuvre at two places"}
 
@@ -270,6 +282,10 @@ class Bank(Cause):
     needs = ("bank",)
     story = "A bank attracts the ship."
     equation = "Y = {strength:.2f} · 0.15 · ½ρLd u² / (1 + (gap/reach)³), N bow out"
+    remedy = (
+        "Use the extended model along these banks only, and check their lines in the "
+        "profile's [site]."
+    )
     parameters = (Parameter("strength", "1", 1.0, 0.08),)
     separated_by = {"shallow_water": "the same run farther from the bank"}
 

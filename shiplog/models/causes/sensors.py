@@ -27,6 +27,10 @@ class HeadingOffset(Cause):
     kind = "sensor"
     story = "The compass is misaligned."
     equation = "ψ_measured = ψ {angle:+.2f} deg"
+    remedy = (
+        "Check the compass against a bearing, correct its offset in the profile, and "
+        "ingest these logs again."
+    )
     parameters = (Parameter("angle", "deg", np.radians(2.5), np.radians(0.25)),)
     separated_by = {
         "current": "one full slow turn, or the same course out and back",
@@ -62,6 +66,10 @@ class YawRateBias(Cause):
     needs = ("yaw rate",)
     story = "The gyro has a bias."
     equation = "r_measured = r {value:+.3f} deg/s"
+    remedy = (
+        "Check the gyro at rest alongside, correct its zero in the profile, and ingest "
+        "these logs again."
+    )
     parameters = (Parameter("value", "deg/s", np.radians(0.2), np.radians(0.01)),)
     separated_by = {"yaw_rate_scale": "rest (bias) against steady turns both ways (scale)"}
 
@@ -81,6 +89,10 @@ class YawRateScale(Cause):
     needs = ("yaw rate",)
     story = "The gyro has a scale error."
     equation = "r_measured = {value:.3f} r"
+    remedy = (
+        "Check the gyro over whole turns, correct its unit in the profile, and ingest "
+        "these logs again."
+    )
     parameters = (Parameter("value", "1", 0.05, 0.003, low=-0.9),)
     separated_by = {"yaw_rate_bias": "rest (bias) against steady turns both ways (scale)"}
 
@@ -111,6 +123,10 @@ class ClockOffset(Cause):
     story = "A channel has a clock offset."
     shifts = True
     equation = "measured(t) = true(t - {time:.2f} s)"
+    remedy = (
+        "Check this channel's clock at the recorder, set `clock` in the profile to the "
+        "stamps of measurement, and ingest these logs again."
+    )
     parameters = (Parameter("time", "s", 0.6, 0.04, low=-5.0, high=5.0),)
     separated_by = {
         "antenna_offset": "spin on the spot against straight acceleration",
@@ -164,6 +180,10 @@ class AntennaOffset(Cause):
     kind = "sensor"
     story = "The antenna is not at its position in the profile."
     equation = "antenna at profile + ({x:+.2f}, {y:+.2f}) m"
+    remedy = (
+        "Measure where the antenna stands, correct its lever arm in the profile, and "
+        "ingest these logs again."
+    )
     parameters = (
         Parameter("x", "m", 0.3, 0.015, of="length"),
         Parameter("y", "m", 0.07, 0.015, of="length"),
@@ -195,6 +215,10 @@ class WindDirectionOffset(Cause):
     needs = ("wind", "wind force")
     story = "The anemometer is misaligned."
     equation = "γ_measured = γ_A {angle:+.1f} deg"
+    remedy = (
+        "Check the vane with the bow in the wind, correct its offset in the profile, "
+        "and ingest these logs again."
+    )
     parameters = (Parameter("angle", "deg", np.radians(10.0), np.radians(1.5)),)
     separated_by = {"current": "one full slow turn; a drifting stop shows the current alone"}
 
@@ -220,6 +244,10 @@ class WindSpeedScale(Cause):
     needs = ("wind", "wind force")
     story = "The anemometer has a scale error."
     equation = "U_measured = {value:.2f} U_A"
+    remedy = (
+        "Check the anemometer against a second one, correct its unit in the profile, "
+        "and ingest these logs again."
+    )
     parameters = (Parameter("value", "1", 0.18, 0.02, low=-0.9),)
     separated_by = {"wind_force": "a second anemometer, or fast straight runs in calm"}
 

@@ -68,6 +68,10 @@ class Fouling(_Factor):
     name = "fouling"
     story = "The hull resistance has changed by fouling."
     equation = "X'₀, X'_u·{factor:.2f}"
+    remedy = (
+        "Inspect and clean the hull. Until then simulate with the extended model, and "
+        "diagnose again after the cleaning."
+    )
     scaled = ("hull.x_0f", "hull.x_0a", "hull.x_u")
     parameters = (Parameter("factor", "1", 0.45, 0.06, low=-1.0),)
     separated_by = {
@@ -87,6 +91,10 @@ class CrossFlowDrag(_Factor):
     name = "cross_flow_drag"
     story = "The cross-flow drag differs from the model's."
     equation = "C_D·{factor:.2f}"
+    remedy = (
+        "Look for what changed the underwater side: draught, trim, bilge keels, "
+        "something towed or caught. Until then simulate with the extended model."
+    )
     scaled = ("hull.c_d",)
     parameters = (Parameter("factor", "1", 0.25, 0.03, low=-1.0),)
     separated_by = {
@@ -112,6 +120,10 @@ class RudderForce(_Factor):
     needs = ("rudder",)
     story = "The rudder force differs from the model's."
     equation = "F_N, F_T·{factor:.2f}"
+    remedy = (
+        "Inspect the rudder: its area, fouling, and what stands in front of it. Until "
+        "then simulate with the extended model."
+    )
     scaled = ("rudder.f_alpha", "rudder.f_t")
     parameters = (Parameter("factor", "1", 0.25, 0.02, low=-1.0),)
     separated_by = {"thrust_loss": "steady speed on a straight course, rudders amidships"}
@@ -137,6 +149,10 @@ class ThrustLoss(Cause):
     needs = ("thrust",)
     story = "The thrust has decreased."
     equation = "K_T·{factor:.2f}"
+    remedy = (
+        "Inspect the propeller: damage, fouling, ropes, ventilation at this draught. "
+        "Until then simulate with the extended model."
+    )
     parameters = (Parameter("factor", "1", 0.3, 0.02, low=-1.0),)
     separated_by = {
         "fouling": "bollard pull (high revolutions at rest) against coasting (propeller stopped)",
@@ -184,6 +200,10 @@ class ThrustDrift(Cause):
     needs = ("thrust",)
     story = "The thrust changes from voyage to voyage."
     equation = "K_T·(1 {slope:+.2f} · share of the campaign)"
+    remedy = (
+        "Follow it: diagnose each new season, and inspect the propeller when the loss "
+        "matters to you."
+    )
     parameters = (Parameter("slope", "1", 0.2, 0.025, low=-1.0),)
     separated_by = {"thrust_loss": "the same run at the beginning and at the end"}
 
@@ -210,6 +230,10 @@ class Payload(Cause):
     kind = "ship"
     story = "The ship carries a load."
     equation = "m + {mass:.1f} kg at {position:+.2f} m"
+    remedy = (
+        "Weigh the ship or read its draughts, and correct mass and centre of gravity in "
+        "the profile."
+    )
     unit_error = 0.1
     parameters = (
         Parameter("mass", "kg", 0.2, 0.015, of="mass", low=-0.5),
@@ -283,6 +307,10 @@ class RudderOffset(_OnRudders):
     name = "rudder_offset"
     story = "The rudders have an offset from their recorded angles."
     equation = "δ = δ_recorded + offset"
+    remedy = (
+        "Check the rudder's zero at the dock, and correct its offset in the profile. "
+        "Then ingest these logs again."
+    )
     parameters = ()
     separated_by = {
         "heading_offset": "hover and coasting with the propeller stopped: the offset then vanishes"
@@ -341,6 +369,10 @@ class RudderLag(_OnRudders):
     name = "rudder_lag"
     story = "The rudders follow their recorded angle with a first-order lag."
     equation = "T δ̇ = δ_recorded - δ,  T = {time:.2f} s"
+    remedy = (
+        "Check the steering gear and where the rudder angle is measured: an order is no "
+        "feedback. Until then simulate with the extended model."
+    )
     parameters = (Parameter("time", "s", 1.6, 0.1, low=0.0, high=20.0),)
     separated_by = {"rudder_delay": "rudder doublets of 2 to 4 s at constant revolutions"}
 
@@ -389,6 +421,10 @@ class RudderDelay(_OnRudders):
     name = "rudder_delay"
     story = "The rudders act later than recorded."
     equation = "δ(t) = δ_recorded(t - {time:.2f} s)"
+    remedy = (
+        "Check the clock of the rudder angle and where it is measured: an order is no "
+        "feedback. Then ingest these logs again."
+    )
     parameters = (Parameter("time", "s", 1.0, 0.1, low=0.0, high=10.0),)
     separated_by = {"rudder_lag": "rudder doublets of 2 to 4 s at constant revolutions"}
 

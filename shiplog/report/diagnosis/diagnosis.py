@@ -18,7 +18,7 @@ from shiplog.report.result import Printed
 from shiplog.simulation.extended_simulator import ExtendedSimulator
 from shiplog.training.runs.load_model import Run
 
-RECORDING = "diagnosis.rrd"  # in the folder of a diagnosis
+RECORDING, PAGE = "diagnosis.rrd", "report.html"  # in the folder of a diagnosis
 
 
 @dataclass(frozen=True, repr=False)
@@ -59,6 +59,11 @@ class Diagnosis(Printed):
         return self.folder / RECORDING if self.decision is not None and self.drawn else None
 
     @property
+    def page(self) -> Path | None:
+        """Path of the page with pictures; None where it could not be drawn."""
+        return self.folder / PAGE if self.drawn else None
+
+    @property
     def causes(self) -> pl.DataFrame:
         """One row per named cause: name, probability and sentence."""
         schema = {"name": pl.String, "probability": pl.Float64, "sentence": pl.String}
@@ -76,6 +81,8 @@ class Diagnosis(Printed):
     def lines(self) -> list[str]:
         """The page, and where the files are."""
         lines = [*page.lines(self.verdict), f"Report: {self.report}"]
+        if self.page is not None:
+            lines.append(f"Page: {self.page}")
         if self.recording is not None:
             lines.append(f"Recording: {self.recording}")
         elif not self.drawn:

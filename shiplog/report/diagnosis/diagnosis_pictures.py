@@ -17,7 +17,6 @@ from shiplog.diagnosis.trial.trial import Trial
 from shiplog.diagnosis.verdict.result import SIDE_THRUST, Decision
 from shiplog.exceptions import listed
 from shiplog.nomenclature.channels import STATE, VELOCITY
-from shiplog.report import viewer
 from shiplog.report.diagnosis import page
 from shiplog.report.diagnosis.diagnosis import Diagnosis
 from shiplog.report.viewer.comparison_data import Current
@@ -28,18 +27,13 @@ from shiplog.voyages.windows.windows import Windows
 NOT_DRAWN = 1e6  # m, m/s: a rollout beyond has left the pond, and is not drawn
 
 
-def save(done: Diagnosis, path: Path) -> None:
-    """The recording of a diagnosis that came to a decision."""
-    viewer.save_diagnosis(exhibit(done), path)
-
-
 def exhibit(done: Diagnosis) -> Exhibit:
     """Of a diagnosis that came to a decision."""
     trial, decision = done.trial, done.decision
     assert trial is not None and decision is not None
     profile = trial.record.profile
     residual, named = _residual(done)
-    tracks, errors = _before_and_after(done)
+    rollouts, errors = _before_and_after(done)
     return Exhibit(
         title=f"{profile.ship.name}: {listed(trial.record.names, most=3)}",
         ship_length=profile.ship.length_m,
@@ -50,7 +44,7 @@ def exhibit(done: Diagnosis) -> Exhibit:
         residual=residual,
         named=named,
         extended=tuple(n.cause.label for n in decision.named) if done.after is not None else (),
-        tracks=tracks,
+        tracks=rollouts,
         errors=errors,
         report=page.markdown(done.verdict),
         run=Path(done.verdict.run).name,
@@ -172,11 +166,8 @@ def _before_and_after(done: Diagnosis) -> tuple[pl.DataFrame, pl.DataFrame]:
     states = {BEFORE: held.states_before}
     if done.after is not None:
         states[AFTER] = held.states_after(decision)
-    numbered = cut.plan.select(
-        "voyage", pl.int_range(pl.len()).over("voyage").alias("window"),
-        pl.col("elapsed").alias("time"),
-    )  # fmt: skip
-    errors = numbered.with_columns(
+    index = numbered(cut)
+    errors = index.with_columns(
         pl.Series("seconds", cut.dt.sum(1)),
         *(
             pl.Series(k, np.where(held.counted, held.parts(v).sum(1), np.nan)).fill_nan(None)
@@ -185,16 +176,24 @@ def _before_and_after(done: Diagnosis) -> tuple[pl.DataFrame, pl.DataFrame]:
     )
     if AFTER not in states:
         errors = errors.with_columns(pl.lit(None, pl.Float64).alias(AFTER))
-    tracks = [_tracks(name, simulated, numbered, cut) for name, simulated in states.items()]
-    return pl.concat(tracks), errors.select(ERROR_COLUMNS.keys())
+    simulated = [tracks(name, values, index, cut) for name, values in states.items()]
+    return pl.concat(simulated), errors.select(ERROR_COLUMNS.keys())
 
 
-def _tracks(model: str, states: np.ndarray, numbered: pl.DataFrame, cut: Windows) -> pl.DataFrame:
+def numbered(cut: Windows) -> pl.DataFrame:
+    """voyage, window (counted in each voyage), time: a row a window."""
+    return cut.plan.select(
+        "voyage", pl.int_range(pl.len()).over("voyage").alias("window"),
+        pl.col("elapsed").alias("time"),
+    )  # fmt: skip
+
+
+def tracks(model: str, states: np.ndarray, windows: pl.DataFrame, cut: Windows) -> pl.DataFrame:
     """A row a sample; what has left the pond is null."""
     count, size, _ = states.shape
     gone = np.logical_or.accumulate(~(np.abs(states).max(-1) < NOT_DRAWN), axis=1)
     states = np.where(gone[..., None], np.nan, states)
-    index = numbered[np.repeat(np.arange(count), size)]
+    index = windows[np.repeat(np.arange(count), size)]
     return (
         index.with_columns(
             pl.lit(model).alias("model"), pl.col("time") + pl.Series(cut.since.reshape(-1))

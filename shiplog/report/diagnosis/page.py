@@ -9,12 +9,15 @@ from shiplog.report.diagnosis.sections import (
     limits,
     ranking,
     reasons,
+    subject,
     traces,
     unseen,
     wrong,
 )
 from shiplog.report.diagnosis.sections.written import bullets
+from shiplog.report.diagnosis.terms import TERMS
 from shiplog.report.diagnosis.verdict import Verdict
+from shiplog.report.evaluation.text_table import inert
 
 SECTIONS = (  # in the order of the page
     lambda v: causes.markdown(v.causes),
@@ -34,8 +37,11 @@ SECTIONS = (  # in the order of the page
 def lines(verdict: Verdict) -> list[str]:
     """Markdown: the causes with numbers and gain, what was rejected or could not be tested and why,
     where errors are."""
-    found = ["# Diagnosis", "", f"**{verdict.sentence}**", ""]
-    found += [f"Model: {verdict.run}, {verdict.made}.", ""]
+    about = f"Model: {verdict.run}, {verdict.made}."
+    if verdict.subject is not None:
+        about = subject.sentence(verdict.subject)
+    found = ["# Diagnosis", "", f"**{verdict.sentence}**", "", about, ""]
+    found += bullets("What to do", dict.fromkeys(c.remedy for c in verdict.causes if c.remedy))
     for section in SECTIONS:
         found += section(verdict)
     return found
@@ -43,3 +49,11 @@ def lines(verdict: Verdict) -> list[str]:
 
 def markdown(verdict: Verdict) -> str:
     return "\n".join(lines(verdict))
+
+
+def written(verdict: Verdict) -> str:
+    """The file: without anything that a viewer of Markdown would load, and with the terms of the
+    method to unfold at its end."""
+    terms = "\n".join(f"- **{term}**: {text}" for term, text in TERMS)
+    fold = f"<details>\n<summary>Terms of the method</summary>\n\n{terms}\n\n</details>\n"
+    return f"{inert(markdown(verdict))}\n{fold}"

@@ -13,6 +13,7 @@ from shiplog.report.diagnosis.sections.limits import NONE_TESTED, Limit, NotShow
 from shiplog.report.diagnosis.sections.ranking import Ranked
 from shiplog.report.diagnosis.sections.reasons import Reason
 from shiplog.report.diagnosis.sections.structure import Structure
+from shiplog.report.diagnosis.sections.subject import Subject
 from shiplog.report.diagnosis.sections.traces import Trace
 from shiplog.report.diagnosis.sections.unseen import Omitted
 from shiplog.report.diagnosis.sections.written import as_json
@@ -41,6 +42,7 @@ class Verdict:
     without    the data that the numbers of each held-out window were fitted without
     contradictions  of the voyages' reports, while which no cause of their channels is named
     hidden     how many causes could not have shown
+    subject    what it is about: ship, run, voyages
     """
 
     verdict: str
@@ -63,6 +65,7 @@ class Verdict:
     notes: tuple[str, ...] = ()
     contradictions: tuple[Contradiction, ...] = ()
     hidden: NotShown = NONE_TESTED
+    subject: Subject | None = None
 
     @property
     def explained(self) -> float:
@@ -89,6 +92,8 @@ class Verdict:
             "not_shown": self.hidden,
             "base": Base(self.run, self.before_effect),
         }
+        if self.subject is not None:
+            found["subject"] = self.subject
         if self.structure is not None:
             found["structure"] = self.structure
         if self.gain is not None:

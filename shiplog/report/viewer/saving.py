@@ -23,19 +23,19 @@ def _picture(comparison: ComparisonData, path: Path) -> None:
     still.write(comparison, path)
 
 
-# A page joins here: ".html" and its writer.
+PAGE = ".html"  # which `report/page/` makes of an evaluation
 WRITERS: dict[str, Writer] = {".rrd": _recording, ".png": _picture, ".svg": _picture}
-NAMES = {".rrd": "Recording", ".png": "Picture", ".svg": "Picture", ".html": "Page"}
+NAMES = {".rrd": "Recording", ".png": "Picture", ".svg": "Picture", PAGE: "Page"}
 
 
 def check(path: Path) -> None:
     """Raises ShiplogError for an ending that nothing is written as, before the work."""
-    if path.suffix.lower() not in WRITERS:
-        endings = ", ".join(WRITERS)
+    if path.suffix.lower() not in NAMES:
+        endings = ", ".join(NAMES)
         what = f"ends in {path.suffix!r}" if path.suffix else "has no ending"
         raise ShiplogError(
             f"--save {path} {what}, which says of no kind of file.",
-            hint=f"end its name in one of {endings}: a recording, or a picture.",
+            hint=f"end its name in one of {endings}: a recording, a picture or a page.",
         )
 
 

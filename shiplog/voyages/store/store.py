@@ -17,6 +17,7 @@ the table as it was measured.
 
 from __future__ import annotations
 
+import datetime
 import hashlib
 import json
 import logging
@@ -181,11 +182,17 @@ class Store:
         """What was found when this voyage was ingested."""
         return VoyageReport.from_json(catalogue.facts(self._folder(name))["report"])
 
-    def datum(self, name: str) -> tuple[float, float] | None:
-        """Latitude and longitude [deg] of its x₀ = y₀ = 0; None where its log had metres."""
+    def origin(self, name: str) -> tuple[str, tuple[float, float] | None]:
+        """When a voyage or its part begins (ISO 8601, UTC), and the latitude and longitude [deg] of
+        x₀ = y₀ = 0; None where its log has no coordinates."""
         part = self.part_of(name)
-        found = catalogue.facts(self._folder(part.whole if part else name)).get("datum")
-        return None if found is None else (float(found[0]), float(found[1]))
+        facts = catalogue.facts(self._folder(part.whole if part else name))
+        begins = datetime.datetime.fromisoformat(facts["start"])
+        if part is not None:
+            begins += datetime.timedelta(seconds=part.begin)
+        datum = facts.get("datum")
+        place = None if datum is None else (float(datum[0]), float(datum[1]))
+        return begins.isoformat(timespec="seconds"), place
 
     def profile(self, names: Iterable[str]) -> Profile:
         """The profile the voyages were read through. Raises StoreError for two ships, and for two

@@ -15,6 +15,10 @@ from shiplog.report.evaluation.text_table import table
 
 NINETY_SPREADS = 1.645  # standard deviations to either end of a 90 % interval
 WHICH = ("channel", "actuator")  # the part of a cause's label after the colon
+SIDE_REMEDY = (
+    "Find out what pushed at these times. If it is a thruster of the ship, record its order or its "
+    "revolutions, and add it to the profile."
+)
 UNADVISED = "the same manoeuvres again, with turns both ways and stops"
 
 
@@ -69,6 +73,7 @@ class NamedCause:
     times                   of an unrecorded thruster, with `voyage`, `start_s`, `end_s`,
                             `force_N`, `sd_N`
     equation                with its numbers
+    remedy                  what to do about it
     indistinguishable_from  causes that these data cannot tell from it
     evidence_nats           log Bayes factor; none of what was chosen on whole windows
     next_test               what tells them apart
@@ -83,6 +88,7 @@ class NamedCause:
     times: tuple[Active, ...] | None = None
     sentence: str
     equation: str
+    remedy: str | None = None
     indistinguishable_from: tuple[str, ...] = ()
     evidence_nats: float | None = None
     next_test: str | None = None
@@ -100,6 +106,7 @@ def of_named(named: Named, advice: Advice | None = None) -> NamedCause:
         parameters=parameters(named),
         sentence=named.cause.sentence(named.estimates),
         equation=equation(named),
+        remedy=named.cause.remedy or None,
         indistinguishable_from=alike,
         evidence_nats=named.evidence if math.isfinite(named.evidence) else None,
         next_test=("; ".join(dict.fromkeys(tests)) or advised) if alike else None,
@@ -147,6 +154,7 @@ def of_side_force(decision: Decision, times: Iterable[Mapping]) -> NamedCause:
             "external force."
         ),
         equation="Y + F(t), N + x F(t)",
+        remedy=SIDE_REMEDY,
         evidence_nats=found.gain,
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any
 
@@ -18,6 +18,6 @@ def as_json(value: Any) -> Any:
     return value
 
 
-def bullets(title: str, lines: Sequence[str]) -> list[str]:
+def bullets(title: str, lines: Collection[str]) -> list[str]:
     """Lines of a page: a heading and a list under it; nothing without one."""
     return [f"## {title}", "", *(f"- {line}" for line in lines), ""] if lines else []

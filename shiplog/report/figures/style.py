@@ -1,0 +1,124 @@
+"""How pictures look: one size, one font, and the colours of `report.colours`.
+
+A picture is drawn on one pair of axes, as wide as half a page. A page puts two next to each
+other; on a phone each has the whole width, and its letters stay as large.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from shiplog.machine import files
+from shiplog.report import colours
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WIDTH = 4.0  # inches: at 72 points an inch less than a phone's screen, so letters are no smaller
+HEIGHT = 2.75  # inches
+POINTS = 900  # of a line: about two for each point of its width on a screen
+RULES: dict[str, Any] = {
+    "font.size": 8.5, "font.family": "sans-serif", "font.sans-serif": ["DejaVu Sans"],
+    "axes.linewidth": 0.6, "axes.titlesize": 9.0, "axes.titleweight": "bold",
+    "axes.titlelocation": "left", "axes.spines.top": False, "axes.spines.right": False,
+    "axes.edgecolor": colours.web(colours.TEXT), "text.color": colours.web(colours.TEXT),
+    "lines.linewidth": 1.2, "legend.frameon": False, "legend.fontsize": 7.5,
+    "xtick.labelsize": 7.5, "ytick.labelsize": 7.5, "savefig.dpi": 200.0, "svg.fonttype": "none",
+    "svg.hashsalt": "shiplog",  # the same file from the same data
+    "path.simplify_threshold": 0.5, "savefig.facecolor": "white", "figure.facecolor": "white",
+}  # fmt: skip
+KINDS = ("svg", "pdf", "png")
+# Whatever the reader has: the widths were set with DejaVu Sans, which is wider than most.
+FONTS = "system-ui, -apple-system, 'Segoe UI', Roboto, 'DejaVu Sans', Arial, sans-serif"
+
+
+@contextmanager
+def drawing(width: float = WIDTH, height: float = HEIGHT) -> Iterator[Figure]:
+    """An empty figure in this style; no window, and nothing of the host's settings is changed."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context(RULES):
+        yield Figure(figsize=(width, height), layout="constrained")
+
+
+def svg(figure: Figure, prefix: str) -> str:
+    """The figure as an element of a page: `<svg …>`, its ids with a prefix of their own.
+
+    Ids of two figures would be alike, since they follow from what is drawn.
+    """
+    import matplotlib
+
+    made = io.StringIO()
+    with matplotlib.rc_context(RULES):
+        figure.savefig(made, format="svg", metadata={"Date": None, "Creator": None})
+    return inline(made.getvalue(), prefix)
+
+
+def inline(text: str, prefix: str) -> str:
+    """A file of matplotlib's as such an element."""
+    text = text[text.index("<svg") :]
+    text = re.sub(r"\s*<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    text = re.sub(r'\bid="', f'id="{prefix}-', text)
+    text = re.sub(r'href="#', f'href="#{prefix}-', text)
+    text = re.sub(r"url\(#", f"url(#{prefix}-", text)
+    text = re.sub(r"(font: [^;\"]*?)'DejaVu Sans'[^;\"]*", rf"\1{FONTS}", text)
+    text = re.sub(r'<svg ([^>]*?)width="[^"]*" ?', r"<svg \1", text, count=1)
+    text = re.sub(r'<svg ([^>]*?)height="[^"]*" ?', r"<svg \1", text, count=1)
+    text = re.sub(r'\b(?:d|x|y|points|transform)="[^"]*"', _rounded, text)
+    return re.sub(r"\n\s*", "\n", text).strip()
+
+
+def _rounded(attribute: re.Match[str]) -> str:
+    """Places to a tenth of a point, which cannot be seen; what is written stays as it is."""
+    return re.sub(r"(\d\.\d)\d+", r"\1", attribute[0])
+
+
+def write(figure: Figure, path: Path) -> list[Path]:
+    """PATH.svg, PATH.pdf and PATH.png, each whole or not at all."""
+    import matplotlib
+
+    made = []
+    with matplotlib.rc_context(RULES):
+        for kind in KINDS:
+            facts = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind, {})
+            to = path.with_name(f"{path.name}.{kind}")
+            with files.whole(to) as partial:
+                figure.savefig(partial, format=kind, metadata=facts)
+            made.append(to)
+    return made
+
+
+def thinned(time: np.ndarray, *values: np.ndarray) -> list[np.ndarray]:
+    """Time [n] and values [n], few enough for a picture: of each stretch of the width the rows with
+    the least and the largest value stay, so that no peak is lost. Gaps (NaN) stay gaps."""
+    count = len(time)
+    if count <= POINTS:
+        return [time, *values]
+    blocks = np.array_split(np.arange(count), POINTS // (2 * len(values)))
+    keep: set[int] = {0, count - 1}
+    for block in blocks:
+        for value in values:
+            part = value[block]
+            there = np.flatnonzero(np.isfinite(part))
+            if len(there) < len(part):
+                keep.add(int(block[np.flatnonzero(~np.isfinite(part))[0]]))
+            if len(there):
+                own = part[there]
+                keep |= {int(block[there[own.argmin()]]), int(block[there[own.argmax()]])}
+    rows = np.array(sorted(keep))
+    return [time[rows], *(value[rows] for value in values)]
+
+
+def empty(axes: Axes, why: str) -> None:
+    """Axes that say why nothing is drawn on them."""
+    axes.set_axis_off()
+    axes.text(0.5, 0.5, why, ha="center", va="center", wrap=True, transform=axes.transAxes)

@@ -1,0 +1,66 @@
+"""L of every held-out window before and after, along the voyages."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import polars as pl
+
+from shiplog.report import colours
+from shiplog.report.figures.chart import legend
+from shiplog.report.figures.content import Content, Picture
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FEW_TICKS = 4  # voyages whose names stand next to each other
+MOST_TICKS = 8  # voyages with a name under the axis; more would overlap
+
+
+def table(content: Content) -> pl.DataFrame:
+    """model, voyage, window, time, seconds, loss, place (of the window, from 0 on), without windows
+    in which a model diverges."""
+    rows = content.data.errors.drop_nulls("loss")
+    order = rows.select("voyage", "window").unique(maintain_order=True).with_row_index("place")
+    return rows.join(order, on=["voyage", "window"], maintain_order="left")
+
+
+def draw(axes: Axes, rows: pl.DataFrame, content: Content) -> None:
+    ends = rows.group_by("place").agg(low=pl.col("loss").min(), high=pl.col("loss").max())
+    axes.vlines(
+        ends["place"].to_numpy(), ends["low"].to_numpy(), ends["high"].to_numpy(),
+        color=colours.web(colours.GRID), linewidth=1.5, zorder=1,
+    )  # fmt: skip
+    for key, label, colour in legend(content.data):
+        own = rows.filter(pl.col("model") == key)
+        if len(own):
+            axes.plot(own["place"].to_numpy(), own["loss"].to_numpy(), "o", color=colour,
+                      markersize=3.5, label=label)  # fmt: skip
+    axes.set_yscale("log")
+    firsts = rows.group_by("voyage", maintain_order=True).agg(pl.col("place").min())
+    step = -(-len(firsts) // MOST_TICKS)
+    axes.set_xticks(firsts["place"].to_list()[::step])
+    ticks = [_short(name) for name in firsts["voyage"].to_list()[::step]]
+    few = len(ticks) <= FEW_TICKS
+    axes.set_xticklabels(ticks, rotation=0 if few else 30, ha="left" if few else "right",
+                         rotation_mode="anchor")  # fmt: skip
+    axes.set_xlabel("windows, from the first of each voyage on")
+    axes.set_ylabel("L of a window")
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+
+
+def _short(name: str) -> str:
+    return name if len(name) <= 16 else f"{name[:7]}…{name[-8:]}"
+
+
+def words(rows: pl.DataFrame, content: Content) -> str:
+    if rows.is_empty():
+        return "No window was simulated."
+    means = dict(rows.group_by("model").agg(pl.col("loss").mean()).iter_rows())
+    text = ", ".join(
+        f"{means[key]:.0f} of {label}" for key, label, _ in legend(content.data) if key in means
+    )
+    return f"L of {rows['place'].n_unique()} windows; in the mean {text}."
+
+
+OF_WINDOWS = Picture("Every window", table, draw, words)

@@ -1,0 +1,1 @@
+"""One self-contained page of a result: no script, no font and no picture from elsewhere."""

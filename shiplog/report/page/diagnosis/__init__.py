@@ -1,0 +1,1 @@
+"""The page of a verdict: a file a section, a line each in `page.SECTIONS`."""

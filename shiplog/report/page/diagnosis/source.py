@@ -1,0 +1,98 @@
+"""What the page of a verdict is made of: the folder that `diagnose` wrote, and nothing else."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from shiplog.exceptions import ShiplogError
+from shiplog.nomenclature.contract import CONTRACT
+from shiplog.report.figures import picture_data, pictures, style
+from shiplog.report.figures.content import Content
+from shiplog.report.page.blocks import Drawn
+
+VERDICT, PROVENANCE = "verdict.json", "provenance.json"
+
+
+@dataclass(frozen=True)
+class Source:
+    """A verdict, the tables of its pictures, and where it comes from."""
+
+    content: Content
+    provenance: Mapping[str, Any]
+
+    @property
+    def verdict(self) -> Mapping[str, Any]:
+        return self.content.verdict
+
+    @property
+    def subject(self) -> Mapping[str, Any]:
+        return self.verdict["subject"]
+
+    @property
+    def word(self) -> str:
+        return str(self.verdict["verdict"])
+
+    def drawn(self, name: str, voyage: str | None = None, wide: bool = False) -> Drawn | None:
+        """A picture with its words; None where there is nothing to draw."""
+        picture = pictures.PICTURES[name]
+        content = self.content if voyage is None else pictures.of_voyage(self.content, voyage)
+        table = picture.table(content)
+        if table.is_empty():
+            return None
+        place = "" if voyage is None else f"-{self.content.data.names.index(voyage) + 1}"
+        svg = style.svg(pictures.figure(name, content), f"{name}{place}")
+        caption = picture.title if voyage is None else f"{picture.title}, {voyage}"
+        return Drawn(svg, picture.words(table, content), caption, wide)
+
+    def gallery(self, names: Sequence[str], voyage: str | None = None) -> list[Drawn]:
+        """Those of these pictures that have something to draw."""
+        found = [self.drawn(name, voyage) for name in names]
+        return [one for one in found if one is not None]
+
+
+def is_verdict(folder: Path) -> bool:
+    """Whether `diagnose` wrote this folder."""
+    return (folder / VERDICT).is_file()
+
+
+def read(folder: Path) -> Source:
+    """Raises ShiplogError for a folder without a verdict, or with one of another contract."""
+    verdict = _json(folder / VERDICT)
+    if verdict.get("contract") != CONTRACT or "verdict" not in verdict:
+        raise ShiplogError(
+            f"{folder / VERDICT} is no verdict of contract {CONTRACT}, but of "
+            f"{verdict.get('contract')!r}.",
+            hint="diagnose again with this version.",
+        )
+    if "subject" not in verdict or not (folder / picture_data.FOLDER).is_dir():
+        raise ShiplogError(
+            f"{folder} was written by an earlier shiplog: it does not have what a page needs.",
+            hint="diagnose again into a new folder.",
+        )
+    try:
+        provenance = _json(folder / PROVENANCE)
+    except ShiplogError:
+        provenance = {}
+    data = picture_data.load(folder / picture_data.FOLDER)
+    return Source(Content(verdict, data), provenance)
+
+
+def _json(path: Path) -> dict:
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        if not isinstance(found, dict):
+            raise ValueError("it is no object")
+    except FileNotFoundError:
+        raise ShiplogError(
+            f"{path.parent} has no {path.name}.",
+            hint="give the folder that `shiplog diagnose` wrote (--out).",
+        ) from None
+    except (OSError, ValueError) as error:
+        raise ShiplogError(
+            f"{path} cannot be read: {error}.", hint="diagnose again into a new folder."
+        ) from error
+    return found

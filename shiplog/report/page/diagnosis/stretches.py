@@ -1,0 +1,43 @@
+"""Stretches of the voyages that the verdict marks, each with the command that opens it."""
+
+from __future__ import annotations
+
+from shiplog.report.page.blocks import Block, Command, Fold, Gallery, Grid, Paragraph, number
+from shiplog.report.page.diagnosis.source import Source
+from shiplog.report.page.diagnosis.where import moment
+
+MOST_ROWS = 40  # of a table; the JSON has them all
+
+
+def blocks(source: Source) -> list[Block]:
+    verdict = source.verdict
+    found: list[Block] = [Gallery(source.gallery(("stretches",)))]
+    rows = [
+        (
+            [one["voyage"]], [number(one["start_s"], "s", 6)], [number(one["end_s"], "s", 6)],
+            [one["kind"]], [one["sentence"]],
+        )
+        for one in verdict["intervals"][:MOST_ROWS]
+    ]  # fmt: skip
+    if rows:
+        found.append(Grid(("voyage", "from", "to", "kind", "what"), rows, ("from", "to")))
+        first = verdict["intervals"][0]
+        found.append(
+            Paragraph(["The first of them in the recording; for another, change the end:"])
+        )
+        found.append(Command(moment(source, first["voyage"], first["start_s"])))
+    else:
+        found.append(Paragraph(["No stretch was left out, or is outside the training data."]))
+    if len(verdict["intervals"]) > MOST_ROWS:
+        found.append(Paragraph([f"And {len(verdict['intervals']) - MOST_ROWS} more."]))
+    if clashes := verdict["contradictions"]:
+        lines = [([c["voyage"]], [c["channel"].replace("_", " ")], [c["sentence"]])
+                 for c in clashes]  # fmt: skip
+        found.append(Grid(("voyage", "channel", "what contradicts"), lines))
+    if verdict["unseen"]:
+        lines = [([one["variable"]], [one["sentence"]]) for one in verdict["unseen"]]
+        found.append(Fold(
+            "Does the rest depend on what the model does not see?",
+            [Grid(("input", "cross-validated R²"), lines)],
+        ))  # fmt: skip
+    return found

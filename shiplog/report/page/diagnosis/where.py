@@ -1,0 +1,35 @@
+"""The window that tells most, and how far off the simulation is as a window goes on."""
+
+from __future__ import annotations
+
+from shiplog.report.figures.chart import closeup_window
+from shiplog.report.page.blocks import Block, Command, Fold, Gallery, Paragraph
+from shiplog.report.page.diagnosis.source import Source
+
+FIRST = ("closeup", "position_error", "heading_error", "channels")
+MOST_TRACKS = 12  # voyages with a chart of their own on the page
+
+
+def blocks(source: Source) -> list[Block]:
+    drawn = source.gallery(FIRST)
+    if not drawn:
+        return [Paragraph(["Nothing was simulated: there is no window to look at."])]
+    found: list[Block] = [Gallery(drawn)]
+    if (chosen := closeup_window(source.content.data)) is not None:
+        voyage, window = chosen
+        own = source.content.data.errors.filter(voyage=voyage, window=window).head(1)
+        found.append(Paragraph(["See this window in the recording:"]))
+        found.append(Command(moment(source, voyage, float(own["time"][0]))))
+    names = source.content.data.names
+    tracks = [one for name in names[:MOST_TRACKS] if (one := source.drawn("track", name))]
+    if tracks:
+        found.append(Fold("Tracks of every voyage", [Gallery(tracks)]))
+    return found
+
+
+def moment(source: Source, voyage: str, seconds: float) -> str:
+    """The command that opens the comparison at a moment."""
+    name = voyage.replace("'", "'\\''")
+    runs = source.provenance.get("run_path") or source.subject["run"]
+    store = source.provenance.get("store_path") or "store"
+    return f"shiplog compare {runs} --store {store} --at '{name}:{seconds:.0f}'"

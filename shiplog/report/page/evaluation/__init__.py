@@ -1,0 +1,1 @@
+"""The page of an evaluation: how far off models are, against baselines."""

@@ -1,0 +1,222 @@
+"""The page of an evaluation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from shiplog.exceptions import listed
+from shiplog.nomenclature.channels import DEGREE
+from shiplog.nomenclature.numbers import counted, figure
+from shiplog.report.diagnosis.sections.subject import MOST_VOYAGES, dates
+from shiplog.report.diagnosis.terms import TERMS
+from shiplog.report.figures import pictures, style
+from shiplog.report.figures.content import Content
+from shiplog.report.page.blocks import (
+    Answers,
+    Block,
+    Command,
+    Drawn,
+    Fold,
+    Gallery,
+    Grid,
+    Items,
+    Line,
+    Number,
+    Page,
+    Paragraph,
+    Section,
+    number,
+    share,
+)
+from shiplog.report.page.evaluation.source import Source
+
+COVERAGE = ("wind", "drift")
+BASELINES = {"hold": "holding the velocity", "least_squares": "quadratic least squares"}
+OWN_TERMS = ("L", "90 % interval")
+MOST_TRACKS = 12  # voyages with a chart of their own
+
+
+def of_source(source: Source) -> Page:
+    subject = source.subject
+    names = listed((one["name"] for one in subject["voyages"]), most=MOST_VOYAGES)
+    when = dates([one["start"] for one in subject["voyages"]])
+    runs = list(source.answers)
+    judged = source.answers[runs[0]]
+    better = _beats(judged)
+    return Page(
+        title=f"{subject['ship']}: evaluation of {listed(runs, most=3)}",
+        kicker=f"{subject['ship']}, {subject['length_m']:g} m · {names} · {when} · "
+        f"{listed(runs, most=4)} · shiplog {subject['shiplog']}",
+        word="better than its baselines" if better else "no better than its baselines",
+        tone="good" if better else "open",
+        claim=_claim(runs[0], judged, source),
+        sections=[
+            Section("answer", "The answer", _answer(source)),
+            Section("where", "Where it shows", _where(source)),
+            Section("voyages", "Voyages and windows", _voyages(source)),
+            Section("coverage", "Training and test", [Gallery(gallery(source.content, COVERAGE))]),
+            Section("execution", "Execution", _execution(source)),
+            Section("terms", "Terms", [Fold("Terms of the method", [_terms()])]),
+        ],
+    )
+
+
+def _claim(run: str, answer: Mapping[str, Any], source: Source) -> str:
+    """How far off, where: the answer with its scope, in one sentence."""
+    subject, judged = source.subject, answer["judgement"]
+    names = listed((one["name"] for one in subject["voyages"]), most=MOST_VOYAGES)
+    when = dates([one["start"] for one in subject["voyages"]])
+    held = counted(answer["windows"], "window")
+    lengths, degrees = judged["median_end_position_lengths"], judged["median_end_heading_deg"]
+    if lengths is None or not math.isfinite(lengths):
+        return f"On {held} of {names} ({when}), {run} diverges."
+    return (
+        f"After {subject['window_s']} s {run} is {figure(lengths)} ship lengths and "
+        f"{figure(degrees)} deg off, in the median of {held} of {names} ({when})."
+    )
+
+
+def gallery(content: Content, names: tuple[str, ...], voyage: str | None = None) -> list[Drawn]:
+    """Those of these pictures that have something to draw."""
+    found = []
+    own = content if voyage is None else pictures.of_voyage(content, voyage)
+    place = "" if voyage is None else f"-{content.data.names.index(voyage) + 1}"
+    for name in names:
+        picture = pictures.PICTURES[name]
+        table = picture.table(own)
+        if table.is_empty():
+            continue
+        svg = style.svg(pictures.figure(name, own), f"{name}{place}")
+        caption = picture.title if voyage is None else f"{picture.title}, {voyage}"
+        found.append(Drawn(svg, picture.words(table, own), caption))
+    return found
+
+
+def _beats(answer: Mapping[str, Any]) -> bool:
+    """Whether L is below that of every baseline."""
+    loss, floors = answer["loss"], answer["floors"]
+    return loss is not None and all(v is None or loss < v for v in floors.values())
+
+
+def _answer(source: Source) -> list[Block]:
+    answer = next(iter(source.answers.values()))
+    length, window = source.subject["length_m"], source.subject["window_s"]
+    yaw_rate = answer["rmse"]["yaw_rate"]
+    big: list[Line] = [
+        [f"After {window} s it is ", number(answer["end_position_m"], "m"), " (",
+         f"{answer['end_position_m'] / length:.2g}", " ship lengths) and ",
+         number(answer["end_heading_deg"], "deg"), " off, in the mean."],
+        ["Root mean square: surge ", number(answer["rmse"]["surge"], "m/s"), ", sway ",
+         number(answer["rmse"]["sway"], "m/s"), ", yaw rate ",
+         Number(yaw_rate, f"{yaw_rate / DEGREE:.2g}\u202fdeg/s"),
+         "."],
+    ] if answer["end_position_m"] is not None else [["Every window diverged."]]  # fmt: skip
+    sure: list[Line] = [[number(answer["windows"]), f" windows of {window} s."]]
+    if answer["band_90"]:
+        inside = min(answer["band_90"].values())
+        sure.append(["Its own 90 % band holds ", share(inside), " of the samples or more."])
+    else:
+        sure.append(["It states no band of its own."])
+    seen = [one["coverage"] for one in answer["voyages"].values() if one["coverage"] is not None]
+    where: list[Line] = [
+        [f"Inside the training data: {100 * min(seen):.0f} to {100 * max(seen):.0f} % of the "
+         "seconds of a voyage."] if seen else ["Coverage is not known."],
+        [_worst_in_words(answer)],
+    ]  # fmt: skip
+    return [
+        Answers([
+            ("How good?", [[answer["sentence"]]]), ("How big are the errors?", big),
+            ("How sure?", sure), ("Where is it worst?", where),
+        ]),
+        _models(source),
+    ]  # fmt: skip
+
+
+def _worst_in_words(answer: Mapping[str, Any]) -> str:
+    worst = answer.get("worst") or []
+    if not worst:
+        return "No window was simulated."
+    one = worst[0]
+    why = f" {one['reason'][:1].upper()}{one['reason'][1:]}." if one["reason"] else ""
+    return f"{one['voyage']}, from {one['start_s']:.0f} s on.{why}"
+
+
+def _models(source: Source) -> Grid:
+    rows = []
+    for name, answer in source.answers.items():
+        rows.append((
+            [name], _or_diverged(answer["loss"]), _or_diverged(answer["end_position_m"], "m"),
+            _or_diverged(answer["end_heading_deg"], "deg"),
+        ))  # fmt: skip
+    floors = next(iter(source.answers.values()))["floors"]
+    rows += [([f"baseline: {BASELINES.get(k, k)}"], _or_diverged(v), ["-"], ["-"])
+             for k, v in floors.items()]  # fmt: skip
+    head = ("model", "L", "position at the end", "heading at the end")
+    return Grid(head, rows, head[1:], "Models and baselines on the same windows")
+
+
+def _or_diverged(value: float | None, unit: str = "") -> Line:
+    return ["diverged"] if value is None else [number(value, unit)]
+
+
+def _where(source: Source) -> list[Block]:
+    names = ("closeup", "position_error", "heading_error", "windows")
+    found: list[Block] = [Gallery(gallery(source.content, names))]
+    tracks = [d for v in source.content.data.names[:MOST_TRACKS]
+              for d in gallery(source.content, ("track",), v)]  # fmt: skip
+    if tracks:
+        found.append(Fold("Tracks of every voyage", [Gallery(tracks)]))
+    return found
+
+
+def _voyages(source: Source) -> list[Block]:
+    answer = next(iter(source.answers.values()))
+    rows = [
+        ([name], _or_diverged(one["loss"]), [number(one["windows"])],
+         [share(one["coverage"])] if one["coverage"] is not None else ["-"])
+        for name, one in answer["voyages"].items()
+    ]  # fmt: skip
+    head = ("voyage", "L", "windows", "inside the training data")
+    found: list[Block] = [Grid(head, rows, head[1:])]
+    if worst := answer.get("worst"):
+        lines = [
+            ([one["voyage"]], [number(one["start_s"], "s", 6)], _or_diverged(one["loss"]),
+             [one["reason"] or "inside the training data"])
+            for one in worst
+        ]  # fmt: skip
+        titles = ("voyage", "from", "L", "why")
+        found.append(Grid(titles, lines, titles[1:3], "Worst windows"))
+        found.append(Paragraph(["The worst of them in the recording:"]))
+        found.append(Command(moment(source.subject, worst[0]["voyage"], worst[0]["start_s"])))
+    return found
+
+
+def moment(subject: Mapping[str, Any], voyage: str, seconds: float) -> str:
+    """The command that opens the comparison at a moment."""
+    name = voyage.replace("'", "'\\''")
+    runs = " ".join(run["path"] for run in subject["runs"])
+    return f"shiplog compare {runs} --store {subject['store']} --at '{name}:{seconds:.0f}'"
+
+
+def _execution(source: Source) -> list[Block]:
+    subject = source.subject
+    rows = [
+        ([one["name"]], [one["start"][:16].replace("T", " ")], [number(one["seconds"], "s", 6)])
+        for one in subject["voyages"]
+    ]
+    head = ("voyage", "start, UTC", "length")
+    lines: list[Line] = [
+        [f"{run['name']}: {run['model']}, trained on {listed(run['trained_on'], most=6)}."]
+        for run in subject["runs"]
+    ]
+    answer = next(iter(source.answers.values()))
+    if answer["too_short"]:
+        lines.append([f"Without a window of that length: {listed(answer['too_short'])}."])
+    return [Grid(head, rows, head[2:]), Items(lines)]
+
+
+def _terms() -> Grid:
+    rows: list[tuple[Line, Line]] = [([t], [text]) for t, text in TERMS if t in OWN_TERMS]
+    return Grid(("term", "what it is"), rows)

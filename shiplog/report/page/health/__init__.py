@@ -1,0 +1,1 @@
+"""The page of voyages' health: what `ingest` found."""

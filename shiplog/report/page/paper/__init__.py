@@ -1,0 +1,1 @@
+"""The page of the published experiment: window sets, losses, statements, figures."""
