@@ -35,7 +35,7 @@ def check(store: Store, voyage: str, seconds: float) -> None:
     (table,) = store.tables([voyage])
     span = (pl.col("time").max() - pl.col("time").min()).dt.total_nanoseconds()
     length = float(table.select(span).collect().item() or 0) * 1e-9
-    if not 0.0 <= seconds <= length:
+    if not 0.0 <= seconds <= math.ceil(length):  # pages round to whole seconds
         raise ShiplogError(
             f"--at {voyage}:{seconds:g} is outside the voyage, which is {length:.0f} s long.",
             hint=f"give it a second between 0 and {length:.0f}.",
