@@ -316,7 +316,8 @@ def _send_chart(
             ),
             static=True,
         )
-        middles = [np.mean([(y, -x) for x, y in bank], axis=0) for bank in drawn.banks]
+        below = np.array((0.0, chart.LINE * frame.point))  # not on a coordinate, which are round
+        middles = [np.mean([(y, -x) for x, y in bank], axis=0) + below for bank in drawn.banks]
         path = entity("track", voyage, "banks", "labels")
         style.labels(recording, path, middles, ["bank"] * len(middles))
 
