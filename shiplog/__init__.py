@@ -17,43 +17,86 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from shiplog.commands.api import (
-        Comparison,
-        Diagnosis,
-        Evaluation,
-        Ingested,
+        check,
         compare,
+        convert,
         diagnose,
         evaluate,
         ingest,
         load,
         open_store,
+        profile,
+        sensors,
         train,
     )
+    from shiplog.commands.convert import Converted, Draft
+    from shiplog.commands.evaluate import Comparison
+    from shiplog.commands.prepare import Ingested
+    from shiplog.commands.sensors import SensorComparison
+    from shiplog.exceptions import ShiplogError
+    from shiplog.report.diagnosis.diagnosis import Diagnosis
+    from shiplog.report.evaluation.evaluation import Evaluation
+    from shiplog.training.runs.load_model import Run
+    from shiplog.voyages.store.store import Store
+    from shiplog.voyages.store.voyage import Voyage
+
+    __version__: str
 
 __all__ = [
     "Comparison",
+    "Converted",
     "Diagnosis",
+    "Draft",
     "Evaluation",
     "Ingested",
+    "Run",
+    "SensorComparison",
+    "ShiplogError",
+    "Store",
+    "Voyage",
+    "__version__",
+    "check",
     "compare",
+    "convert",
     "diagnose",
     "evaluate",
     "ingest",
     "load",
     "open_store",
+    "profile",
+    "sensors",
     "train",
 ]
+
+# Where a class is defined; functions are in `commands/api.py`.
+_CLASSES = {
+    "Comparison": "commands.evaluate",
+    "Converted": "commands.convert",
+    "Diagnosis": "report.diagnosis.diagnosis",
+    "Draft": "commands.convert",
+    "Evaluation": "report.evaluation.evaluation",
+    "Ingested": "commands.prepare",
+    "Run": "training.runs.load_model",
+    "SensorComparison": "commands.sensors",
+    "ShiplogError": "exceptions",
+    "Store": "voyages.store.store",
+    "Voyage": "voyages.store.voyage",
+}
 
 
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("shiplog")
+    from importlib import import_module
+
     from shiplog.machine import disk_cache
 
     disk_cache.keep_compiled()
-    from shiplog.commands import api
-
-    return getattr(api, name)
+    return getattr(import_module(f"shiplog.{_CLASSES.get(name, 'commands.api')}"), name)
 
 
 def __dir__() -> list[str]:

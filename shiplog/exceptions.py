@@ -5,6 +5,8 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+MOST_NEAR = 3  # names that are close to a wrong one, in a message
+
 
 class ShiplogError(Exception):
     """The input is at fault. The command line prints it without a traceback and exits with 1."""
@@ -42,12 +44,47 @@ class StoreError(ShiplogError):
     """The store cannot be read or written as requested."""
 
 
+class VoyageMissing(StoreError, KeyError):
+    """There is no voyage of that name in a store; a KeyError as well, as of a dict."""
+
+    def __init__(self, name: str, available: Iterable[str], store: str) -> None:
+        names = list(available)
+        near = difflib.get_close_matches(str(name), names, n=MOST_NEAR, cutoff=0.5)
+        there = f"Names near it: {listed(near)}" if near else f"There are {listed(names)}"
+        super().__init__(
+            f"There is no voyage {name!r} in the store {store}. {there}.",
+            hint="`for voyage in store` goes through them all; a part of one is 'name[0:1200]'.",
+        )
+
+
 class WindowError(ShiplogError):
     """No window of the asked length can be cut from these voyages."""
 
 
 class RunError(ShiplogError):
     """A run folder is missing, unfinished, or belongs to other settings."""
+
+
+class RunNotEvaluated(RunError, KeyError):
+    """A run that an evaluation does not have; a KeyError as well, as of a dict."""
+
+    def __init__(self, name: str, available: Iterable[str]) -> None:
+        names = list(available)
+        super().__init__(
+            f"The evaluation has no run {name!r}{nearest(str(name), names)}.",
+            hint=f"it has {listed(names)}.",
+        )
+
+
+class SeveralRuns(RunError, AttributeError):
+    """A number of one run is asked of an evaluation of several; an AttributeError as well."""
+
+    def __init__(self, what: str, available: Iterable[str]) -> None:
+        names = sorted(available)
+        super().__init__(
+            f"The evaluation is of several runs, {listed(names)}: each has its own {what}.",
+            hint=f"name one: evaluation[{names[0]!r}].{what}; all of them are in .summary.",
+        )
 
 
 class UnreadableError(RunError):

@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from shiplog.exceptions import ProfileError
 from shiplog.nomenclature import units
-from shiplog.ship_profile.profile import Source
+from shiplog.ship_profile.profile import Column, Source
 
 TURN = Fraction("6.283185307179586476925286766559")  # rad
 # NIST SP 811, Appendix B; a servo's full command is 400 us of its pulse.
@@ -48,3 +49,27 @@ def test_what_a_profile_makes_of_a_number_is_undone_by_the_definition(value, off
     si = (value - zero) * factor
     back = si / (sign * float(DEFINED[unit])) + offset
     assert back == pytest.approx(value, abs=1e-9 * (abs(value) + abs(offset) + 1.0))
+
+
+def cased(unit):
+    return {unit.upper(), unit.title(), unit.swapcase(), unit.capitalize()} - set(units.CASED)
+
+
+@pytest.mark.parametrize("unit", sorted(DEFINED))
+def test_a_profile_takes_a_unit_in_any_letter_case(unit):
+    for written in cased(unit):
+        source = Source(topic="/a", fields=("b", "c"), units=(written, written))
+        assert source.units == (unit, unit)
+        ((zero, factor),) = Source(topic="/a", field="b", unit=written).scale()
+        assert (zero, factor) == (0.0, units.factor(unit))
+        assert Column(channel="time", unit=written).unit == unit
+
+
+def test_no_two_units_differ_by_letter_case_alone():
+    assert len({unit.lower() for unit in DEFINED}) == len(DEFINED)
+
+
+@pytest.mark.parametrize(("unit", "meant"), [("kN", "kilonewtons"), ("M", "nautical miles")])
+def test_where_case_decides_a_unit_is_not_guessed(unit, meant):
+    with pytest.raises(ProfileError, match=meant):
+        Source(topic="/a", field="b", unit=unit).scale()

@@ -18,11 +18,19 @@ store = taken.store
 store.voyages()  # a polars frame
 
 # %% [markdown]
+# A voyage is in the store by its name, with its rows at 10 Hz and 1 Hz, its profile and findings.
+
+# %%
+voyage = store["voyage_6"]
+voyage.seconds, voyage.rows_1hz.shape, voyage.findings
+
+# %% [markdown]
 # A model of the ship as it was in season 1. `model` is `mmg` (physics, identified), `feedforward`
 # (the published network) or `hybrid`.
 
 # %%
 run = shiplog.train(store, "tour/mmg", model="mmg", voyages=["voyage_1", "voyage_2"], folds=0)
+run.coefficients["hull.y_v"]
 
 # %% [markdown]
 # The model against a voyage that it was not trained on, and two baselines.
@@ -31,6 +39,9 @@ run = shiplog.train(store, "tour/mmg", model="mmg", voyages=["voyage_1", "voyage
 scored = shiplog.evaluate(run, store, "voyage_6")
 print(scored)
 scored.errors
+
+# %%
+scored.loss, scored.baselines
 
 # %%
 pictures = shiplog.compare(run, store, "voyage_6", save="tour/compare.rrd")

@@ -160,7 +160,9 @@ def units_text() -> str:
             _channels(),
             "\n## Units\n",
             "Factors to SI; propellers are in rev/s. `pwm` is a servo pulse in µs: `offset` is the "
-            "neutral pulse, and\n400 µs more or less is full command, 1 or -1.\n",
+            "neutral pulse, and\n400 µs more or less is full command, 1 or -1. "
+            "Letter case does not matter (`M/S`, `Deg`), but `kN` and `M` are\nrefused: they are "
+            "kilonewtons and nautical miles.\n",
             _units(),
             "\nA unit that measures something else than its channel is refused. An actuator may be "
             "given as its\nvalue, or as the share or servo pulse that commands it:\n",

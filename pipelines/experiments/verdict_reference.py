@@ -19,6 +19,7 @@ from shiplog.report.diagnosis.sections.limits import Limit, NotShown
 from shiplog.report.diagnosis.sections.ranking import Ranked
 from shiplog.report.diagnosis.sections.reasons import Reason
 from shiplog.report.diagnosis.sections.structure import Structure
+from shiplog.report.diagnosis.sections.subject import Subject
 from shiplog.report.diagnosis.sections.traces import Trace
 from shiplog.report.diagnosis.sections.unseen import Omitted
 from shiplog.report.diagnosis.sections.wrong import ChannelError
@@ -46,6 +47,7 @@ KEYS: dict[str, type | str] = {
     "intervals": Interval,
     "notes": "sentences on the model and the data",
     "base": Base,
+    "subject": Subject,
     "recording": "of the command, not in the file: the path of `diagnosis.rrd`",
 }
 # Of a class that two keys share, what each of them is.

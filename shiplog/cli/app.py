@@ -42,7 +42,6 @@ COMMANDS = (
 
 app = typer.Typer(
     no_args_is_help=True,
-    add_completion=False,
     context_settings={"help_option_names": ["-h", "--help"]},
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
@@ -84,5 +83,5 @@ def _every(
     """Learn a ship's dynamic model from its logs, and see where it fails."""
 
 
-for _command in COMMANDS:
-    app.command()(_command)
+for _command in COMMANDS:  # the list has each first sentence in full, however narrow the terminal
+    app.command(short_help=(_command.__doc__ or "").split("\n", 1)[0])(_command)

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from shiplog.cli import completion
 from shiplog.cli.inputs import check_runs
 from shiplog.cli.options import (
     STORE,
@@ -22,7 +23,9 @@ from shiplog.exceptions import ShiplogError, UsageError
 
 
 def compare(
-    runs: Annotated[list[Path], typer.Argument(help="One or more trained runs.")],
+    runs: Annotated[
+        list[Path], typer.Argument(help="One or more trained runs.", autocompletion=completion.runs)
+    ],
     voyages: TestVoyages = None,
     store: StoreOption = STORE,
     save: Annotated[

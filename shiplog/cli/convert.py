@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from shiplog.cli import completion
 from shiplog.cli.options import JsonOption
 from shiplog.cli.output import LOST, answer
 
@@ -25,6 +26,7 @@ def convert(
         typer.Option(
             "--profile",
             help="The profile whose [table] section names the columns; NMEA and bags need none.",
+            autocompletion=completion.profiles,
         ),
     ] = None,
     json_to: JsonOption = None,
@@ -39,7 +41,10 @@ def convert(
     from shiplog.ship_profile import file as profiles
 
     ship = profiles.load(profile) if profile else None
-    from shiplog.commands.convert import convert as convert_tables
+    from shiplog.commands.bars import loading
+
+    with loading():
+        from shiplog.commands.convert import convert as convert_tables
 
     done = convert_tables(tables, ship, out)
     answer(done, json_to)

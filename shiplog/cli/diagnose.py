@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from shiplog.cli import completion
 from shiplog.cli.inputs import check_runs
 from shiplog.cli.options import STORE, Causes, JsonOption, StoreOption, TrialVoyages
 from shiplog.cli.output import LOST, answer
@@ -14,7 +15,10 @@ from shiplog.cli.output import LOST, answer
 
 def diagnose(
     context: typer.Context,
-    run: Annotated[Path, typer.Argument(help="A trained run, such as runs/mmg.")],
+    run: Annotated[
+        Path,
+        typer.Argument(help="A trained run, such as runs/mmg.", autocompletion=completion.runs),
+    ],
     voyages: TrialVoyages = None,
     store: StoreOption = STORE,
     out: Annotated[Path, typer.Option(help="Folder for report, verdict and recording.")] = Path(

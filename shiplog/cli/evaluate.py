@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from shiplog.cli import completion
 from shiplog.cli.inputs import check_runs
 from shiplog.cli.options import (
     STORE,
@@ -21,7 +22,10 @@ from shiplog.cli.output import LOST, answer, leave_lost
 
 
 def evaluate(
-    run: Annotated[Path, typer.Argument(help="A trained run, such as runs/ref.")],
+    run: Annotated[
+        Path,
+        typer.Argument(help="A trained run, such as runs/ref.", autocompletion=completion.runs),
+    ],
     voyages: TestVoyages = None,
     store: StoreOption = STORE,
     cause: Causes = None,

@@ -12,10 +12,7 @@ import typer
 from shiplog.exceptions import ShiplogError
 
 if TYPE_CHECKING:
-    from rich.table import Table as RichTable
-
     from shiplog.commands.prepare import Ingested
-    from shiplog.report.evaluation.text_table import Table
     from shiplog.report.result import Result
 
 LOST = 3  # exit code: done, but something was lost or refused
@@ -54,27 +51,16 @@ def _print(lines: Sequence[str]) -> None:
     from rich.console import Console
     from rich.text import Text
 
+    from shiplog.cli.terminal_tables import drawn
     from shiplog.report.evaluation.text_table import Table
 
     console = Console()
     for line in lines:
         if isinstance(line, Table) and line.rows:
-            console.print(_drawn(line))
+            for number, block in enumerate(drawn(line, console.width)):
+                console.print(*([""] if number else []), block, sep="\n")
         else:
             console.print(Text(line), soft_wrap=True)
-
-
-def _drawn(table: Table) -> RichTable:
-    from rich import box
-    from rich.table import Table as RichTable
-    from rich.text import Text
-
-    drawn = RichTable(box=box.SIMPLE_HEAD, pad_edge=False)
-    for title, right in zip(table.head, table.right, strict=True):
-        drawn.add_column(Text(title), justify="right" if right else "left")
-    for row in table.rows:
-        drawn.add_row(*map(Text, row))
-    return drawn
 
 
 def leave(done: Ingested, json_to: str | None) -> None:

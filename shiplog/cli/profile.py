@@ -27,19 +27,14 @@ def profile(
 
     Example: shiplog profile unknown.mcap --out my-ship.toml
     """
-    from shiplog.machine import files
     from shiplog.machine.paths import check_file, refuse_taken
 
-    if out is not None:
+    if out is not None:  # before the log is read
         refuse_taken(out)
-        out = check_file(out, "--out")
-    from shiplog.commands.convert import draft
-    from shiplog.nomenclature.contract import CONTRACT
-    from shiplog.report.result import Answer
+        check_file(out, "--out")
+    from shiplog.commands.bars import loading
 
-    text = draft(log, vessel)
-    content = {"contract": CONTRACT, "profile": text, "written": None if out is None else str(out)}
-    if out is not None:
-        files.write_text(out, text)
-        text = f"draft written to {out}: look over every line that says CHECK"
-    answer(Answer((text,), content), json_to)
+    with loading():
+        from shiplog.commands.convert import draft_profile
+
+    answer(draft_profile(log, out, vessel), json_to)

@@ -7,9 +7,11 @@ from typing import Annotated
 
 import typer
 
+from shiplog.cli import completion
 from shiplog.cli.inputs import check_voyages
 from shiplog.cli.options import (
     STORE,
+    AutoWindow,
     Device,
     Epochs,
     JsonOption,
@@ -18,20 +20,41 @@ from shiplog.cli.options import (
     TrainingVoyages,
     Validation,
     Width,
-    Window,
 )
 from shiplog.cli.output import answer
 from shiplog.exceptions import UsageError, listed
 from shiplog.models import FORCES, MODELS
+from shiplog.nomenclature.channels import AUTO_WINDOW
 from shiplog.voyages.windows.augmentation import AUGMENTATIONS
 
 Out = Annotated[Path, typer.Option(help="The run folder to make.")]
-Model = Annotated[str, typer.Option(help=f"Which dynamic model: {', '.join(MODELS)}.")]
-Data = Annotated[str, typer.Option(help=f"The paper's window set: {', '.join(AUGMENTATIONS)}.")]
-Recipe = Annotated[str, typer.Option(help="fast, or paper: the published one, which takes hours.")]
+Model = Annotated[
+    str,
+    typer.Option(
+        help=f"Which dynamic model: {', '.join(MODELS)}; begin with mmg.",
+        autocompletion=completion.of_words(MODELS),
+    ),
+]
+Data = Annotated[
+    str,
+    typer.Option(
+        help=f"The paper's window set: {', '.join(AUGMENTATIONS)}.",
+        autocompletion=completion.of_words(AUGMENTATIONS),
+    ),
+]
+Recipe = Annotated[
+    str,
+    typer.Option(
+        help="fast, or paper: the published one, which takes hours.",
+        autocompletion=completion.of_words(("fast", "paper")),
+    ),
+]
 WindInput = Annotated[
     str | None,
-    typer.Option(help="angle (default of the paper's recipe) or components (of the fast one)."),
+    typer.Option(
+        help="angle (default of the paper's recipe) or components (of the fast one).",
+        autocompletion=completion.of_words(("angle", "components")),
+    ),
 ]
 Fit = Annotated[
     bool,
@@ -49,6 +72,7 @@ Without = Annotated[
     typer.Option(
         help=f"Physical models: a force to switch off: {', '.join(FORCES[:-1])} or {FORCES[-1]}; "
         "several times.",
+        autocompletion=completion.of_words(FORCES),
     ),
 ]
 Free = Annotated[
@@ -75,9 +99,16 @@ Unchecked = Annotated[
 ]
 Again = Annotated[
     Path | None,
-    typer.Option(help="Repeat this run from its folder alone; every setting is that run's."),
+    typer.Option(
+        help="Repeat this run from its folder alone; every setting is that run's.",
+        autocompletion=completion.runs,
+    ),
 ]
 
+NO_MODEL = (
+    "No --model is given: this trains {model}, the paper's network. To begin with a ship, take "
+    "--model mmg: it needs fewer voyages, and its coefficients have a meaning."
+)
 OF_AGAIN = ("out", "again", "store", "json_to")  # parameters that go with --again
 
 
@@ -90,7 +121,7 @@ def train(
     validation: Validation = None,
     seeds: Seeds = 1,
     recipe: Recipe = "fast",
-    window: Window = 100,
+    window: AutoWindow = "100",
     width: Width = 256,
     wind_input: WindInput = None,
     epochs: Epochs = None,
@@ -120,9 +151,10 @@ def train(
 
     options = TrainOptions(
         model=model, data=data, voyages=tuple(voyages or ()), validation=tuple(validation or ()),
-        seeds=seeds, window=window, recipe=recipe, width=width, wind_input=wind_input,
-        epochs=epochs, device=device, fit=fit, parameters=parameters, without=tuple(without or ()),
-        free=tuple(free or ()), folds=folds, unchecked=unchecked,
+        seeds=seeds, window="auto" if window == AUTO_WINDOW else int(window), recipe=recipe,
+        width=width, wind_input=wind_input, epochs=epochs, device=device, fit=fit,
+        parameters=parameters, without=tuple(without or ()), free=tuple(free or ()), folds=folds,
+        unchecked=unchecked,
     )  # fmt: skip
     options.check()
     refuse_run(out)
@@ -136,8 +168,12 @@ def train(
         answer(found, json_to)
         return
     check_voyages(store, voyages, validation)
-    from shiplog.commands.train import train_command
+    if not _typed(context, "model"):
+        typer.echo(NO_MODEL.format(model=model), err=True)
+    from shiplog.commands.bars import loading
 
+    with loading():
+        from shiplog.commands.train import train_command
     found = train_command(store, out, options)
     answer(found, json_to)
 

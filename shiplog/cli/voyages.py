@@ -34,10 +34,13 @@ def voyages(
     from dataclasses import asdict
 
     if sensors:
-        from shiplog.commands.sensors import sensors_command
+        from shiplog.commands.bars import loading
 
-        found = sensors_command(store, voyages or [])
-        answer(found, json_to)
+        with loading():
+            from shiplog.commands.sensors import compare_sensors
+        from shiplog.voyages.store.store import Store
+
+        answer(compare_sensors(Store(store), voyages or []), json_to)
         return
 
     from shiplog.nomenclature.contract import CONTRACT
@@ -56,7 +59,7 @@ def voyages(
         answer(Answer((), {"contract": CONTRACT, "voyages": []}), json_to)
         raise typer.Exit(1)
     if catalogue.unfinished(store):
-        from shiplog.voyages.store.store import Store  # it loads polars, which takes 0.3 s
+        from shiplog.voyages.store.store import Store
 
         Store(store).mend(wait=False)
     entries = catalogue.entries(store)

@@ -1,34 +1,62 @@
 """What `import shiplog` gives: the commands as functions, on the same code.
 
-A store is a `Store` or its folder, a run a `Run` or its folder. Results are what the command line
-prints, frozen: `text`, `json`, and polars frames; a notebook shows the text as Markdown.
+A store is a `Store` or its folder, a run a `Run` or its folder; voyages are names, shell patterns
+such as `june_*`, or voyages of a store. Results are what the command line prints, frozen: `text`,
+`json`, and polars frames; a notebook shows the text as Markdown. What is heavy is imported by the
+function that needs it: a store opens in a tenth of a second.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Literal
 
-from shiplog.commands import diagnose as diagnosing
-from shiplog.commands import evaluate as evaluating
-from shiplog.commands import prepare
-from shiplog.commands.evaluate import Comparison
-from shiplog.commands.prepare import Ingested
-from shiplog.report.diagnosis.diagnosis import Diagnosis
-from shiplog.report.evaluation.evaluation import Evaluation
-from shiplog.training.runs import load_model
-from shiplog.training.runs.load_model import Run
-from shiplog.training.settings.options import TrainOptions
+from shiplog.exceptions import ShiplogError
 from shiplog.voyages.store.store import Store
+from shiplog.voyages.store.voyage import Voyage
 
+if TYPE_CHECKING:
+    from shiplog.commands.convert import Converted, Draft
+    from shiplog.commands.evaluate import Comparison
+    from shiplog.commands.prepare import Ingested
+    from shiplog.commands.sensors import SensorComparison
+    from shiplog.report.diagnosis.diagnosis import Diagnosis
+    from shiplog.report.evaluation.evaluation import Evaluation
+    from shiplog.training.runs.load_model import Run
+
+    AnyRun = Run | str | Path
+    AnyRuns = AnyRun | Sequence[AnyRun]
+
+AnyStore = Store | str | Path
 Paths = str | Path | Iterable[str | Path]
-Names = str | Sequence[str]
+Names = str | Voyage | Iterable[str | Voyage]
 Files = str | Path | Sequence[str | Path]
+Words = str | Sequence[str]
+
+
+def check(logs: Paths, *, profile: str | Path | None = None) -> Ingested:
+    """What is readable, lost, late or out of order in logs, or folders of them; nothing is stored.
+
+    profile   a shipped profile's name or a TOML's path; found by the log's topics unless given.
+              Where one fits, the sensors are compared with each other, too
+
+    Raises ShiplogError where no log could be read.
+    """
+    from shiplog.commands import prepare
+
+    done = prepare.check_logs(_files(logs), _profile(profile))
+    if done.refused and not done.reports:
+        raise next(iter(done.refused.values()))
+    return done
 
 
 def ingest(
-    logs: Paths, store: str | Path = "store", *, profile: str | None = None, correct: bool = False
+    logs: Paths,
+    store: AnyStore = "store",
+    *,
+    profile: str | Path | None = None,
+    correct: bool = False,
 ) -> Ingested:
     """MCAP logs, or folders of them, into a store: a 10 Hz table a voyage, its faults marked.
 
@@ -37,12 +65,51 @@ def ingest(
 
     Raises ShiplogError where no log could be taken.
     """
-    into = Store(Path(store))
-    found = prepare.expand(map(Path, [logs] if isinstance(logs, str | Path) else logs))
-    done = prepare.ingest_logs(found, profile, into, correct)
+    from shiplog.commands import prepare
+
+    found = prepare.expand(_files(logs))
+    done = prepare.ingest_logs(found, _profile(profile), Store(_path(store)), correct)
     if done.refused and not done.reports:
         raise next(iter(done.refused.values()))
     return done
+
+
+def convert(
+    sources: Paths, out: str | Path = "logs", *, profile: str | Path | None = None
+) -> Converted:
+    """Tables, NMEA 0183 text, Signal K logs and ROS bags to MCAP logs in the folder `out`.
+
+    profile   whose [table] section names a table's columns: a shipped profile's name or a TOML's
+              path; NMEA and bags need none
+
+    Raises ShiplogError where nothing could be converted.
+    """
+    from shiplog.commands import convert as converting
+    from shiplog.machine.paths import check_writable
+    from shiplog.ship_profile import file as profiles
+
+    check_writable(Path(out), "--out")
+    of = _profile(profile)
+    ship = None if of is None else profiles.load(of)
+    done = converting.convert(_files(sources), ship, Path(out))
+    if done.refused and not done.logs:
+        raise ShiplogError(str(next(iter(done.refused.values()))))
+    return done
+
+
+def profile(
+    log: str | Path, out: str | Path | None = None, *, vessel: str | None = None
+) -> Draft:  # fmt: skip
+    """Draft a ship profile from a log's topics, or a table's columns: `.toml` is its text.
+
+    out      write it there
+    vessel   which ship, where the log holds many: its MMSI or name
+
+    Raises ShiplogError.
+    """
+    from shiplog.commands.convert import draft_profile
+
+    return draft_profile(Path(log), None if out is None else Path(out), vessel)
 
 
 def open_store(path: str | Path) -> Store:
@@ -52,23 +119,77 @@ def open_store(path: str | Path) -> Store:
     return store
 
 
-def train(store: Store | str | Path, out: str | Path, **options: Any) -> Run:
-    """A model of the voyages, as the run folder `out`. The options are those of `TrainOptions`, as
-    `shiplog train` has them:
+def sensors(store: AnyStore, voyages: Names = ()) -> SensorComparison:
+    """Faults of the instruments that several voyages together show. Raises ShiplogError."""
+    from shiplog.commands.sensors import compare_sensors
+
+    return compare_sensors(Store(_path(store)), _names(voyages))
+
+
+def train(
+    store: AnyStore,
+    out: str | Path,
+    *,
+    model: str = "feedforward",
+    data: str = "ref",
+    voyages: Names = (),
+    validation: Names = (),
+    seeds: int = 1,
+    window: int | Literal["auto"] = 100,
+    unchecked: bool = False,
+    recipe: Literal["fast", "paper"] = "fast",
+    width: int = 256,
+    wind_input: Literal["angle", "components"] | None = None,
+    epochs: int | None = None,
+    device: Literal["cpu", "cuda"] = "cpu",
+    fit: bool = True,
+    parameters: str | Path | None = None,
+    without: Words = (),
+    free: Words = (),
+    folds: int | None = None,
+) -> Run:
+    """A model of the voyages, as the run folder `out`.
 
         shiplog.train(store, "runs/mmg", model="mmg", voyages=["june_*"])
 
+    model        which dynamic model: feedforward, mmg or hybrid; begin with mmg
+    data         the paper's window set: ref, sli2, ..., d-ref
+    voyages      names or shell patterns of the voyages to learn from; all where there are none
+    validation   those to validate on
+    seeds        how many; they are numbered from 0
+    window       length of a window [s]: samples at 1 Hz; or auto, which follows the ship (L/U)
+    unchecked    although the profile still says CHECK, or sensors contradict each other
+
+    Of networks:
+    recipe       fast, or paper: the published one, which takes hours
+    width        units of each hidden layer
+    wind_input   angle (default of the paper's recipe) or components (of the fast one)
+    epochs       cap on the epochs (paper) or iterations (fast)
+    device       cpu, or cuda: the paper's recipe on an NVIDIA GPU, all seeds at once
+
+    Of physical models:
+    fit          identify; else the coefficients as they are published or estimated
+    parameters   TOML of coefficients to start from
+    without      forces to switch off: propeller, rudder, thruster or wind
+    free         patterns of the coefficients to identify, such as wind.*; all where there are none
+    folds        parts in which voyages are held out in turn, 5 unless given; below 2 none is
+
     Raises ShiplogError for voyages that cannot be trained on, for options that exclude each other
-    and for a folder that is taken; TypeError for an option that there is not.
+    and for a folder that is taken.
     """
     from shiplog.commands.train import train_command
+    from shiplog.training.runs import load_model
+    from shiplog.training.settings.options import TrainOptions
 
-    several = ("voyages", "validation", "without", "free")
-    names = {name: tuple(_names(options.pop(name, ()))) for name in several}
-    if (given := options.pop("parameters", None)) is not None:
-        options["parameters"] = Path(given)
+    options = TrainOptions(
+        model=model, data=data, voyages=tuple(_names(voyages)),
+        validation=tuple(_names(validation)), seeds=seeds, window=window, unchecked=unchecked,
+        recipe=recipe, width=width, wind_input=wind_input, epochs=epochs, device=device, fit=fit,
+        parameters=None if parameters is None else Path(parameters),
+        without=tuple(_names(without)), free=tuple(_names(free)), folds=folds,
+    )  # fmt: skip
     into = Path(out)
-    train_command(_path(store), into, TrainOptions(**names, **options))
+    train_command(_path(store), into, options)
     return load_model.load(into)
 
 
@@ -76,45 +197,51 @@ def load(path: str | Path, causes: Files = ()) -> Run:
     """A finished run. `causes`: Python files of its causes that are not in the catalogue, which
     are executed. Raises RunError."""
     from shiplog.models.causes import user
+    from shiplog.training.runs import load_model
 
     return load_model.load(Path(path), user.load(_files(causes)))
 
 
 def evaluate(
-    runs: Run | str | Path | Sequence[Run | str | Path],
-    store: Store | str | Path,
-    voyages: Names = (),
-    *,
-    causes: Files = (),
+    runs: AnyRuns, store: AnyStore, voyages: Names = (), *, causes: Files = ()
 ) -> Evaluation:
     """Simulated against measured, window by window, with baselines. Without `voyages`, those that
-    the run kept for its test. `causes`: as for `load`. Raises ShiplogError."""
+    the run kept for its test. `causes`: as for `load`. Raises ShiplogError.
+
+    Of one run `evaluation.loss` is its mean L, `evaluation.rmse` its errors, and so on; of several
+    `evaluation["mmg"].loss`. `evaluation.baselines` is what they compare with.
+    """
+    from shiplog.commands import evaluate as evaluating
+
     return evaluating.evaluate_runs(
         _runs(runs), Store(_path(store)), _names(voyages), _files(causes)
     )
 
 
 def compare(
-    runs: Run | str | Path | Sequence[Run | str | Path],
-    store: Store | str | Path,
+    runs: AnyRuns,
+    store: AnyStore,
     voyages: Names = (),
     *,
     save: str | Path | None = None,
     causes: Files = (),
+    at: str | None = None,
 ) -> Comparison:
-    """The same as a Rerun recording: `save`, or compare.rrd in the first run. Raises
-    ShiplogError."""
+    """The same as a Rerun recording: `save`, or compare.rrd in the first run. `save` may also be
+    a .png, .svg or .html. `at`: "VOYAGE:SECONDS" that it is opened at. Raises ShiplogError."""
+    from shiplog.commands import evaluate as evaluating
+
     to = None if save is None else Path(save)
     done = evaluating.compare_runs(
-        _runs(runs), Store(_path(store)), _names(voyages), to, _files(causes)
+        _runs(runs), Store(_path(store)), _names(voyages), to, _files(causes), at
     )
     done.written()
     return done
 
 
 def diagnose(
-    run: Run | str | Path,
-    store: Store | str | Path,
+    run: AnyRun,
+    store: AnyStore,
     voyages: Names = (),
     *,
     out: str | Path = "diagnosis",
@@ -123,11 +250,14 @@ def diagnose(
 ) -> Diagnosis:
     """What the model gets wrong on these voyages, why, and what the causes gain on held-out ones.
 
+    out      folder for report, verdict and recording
     extend   write the model with the named causes as this run
     causes   Python files with causes of your own, which are executed
 
     Raises ShiplogError.
     """
+    from shiplog.commands import diagnose as diagnosing
+
     to = None if extend is None else Path(extend)
     (path,) = _runs(run)
     return diagnosing.diagnose_run(
@@ -135,18 +265,25 @@ def diagnose(
     )
 
 
-def _path(store: Store | str | Path) -> Path:
+def _path(store: AnyStore) -> Path:
     return store.path if isinstance(store, Store) else Path(store)
 
 
 def _names(voyages: Names) -> list[str]:
-    return [voyages] if isinstance(voyages, str) else list(voyages)
+    several = [voyages] if isinstance(voyages, str | Voyage) else voyages
+    return [one.name if isinstance(one, Voyage) else one for one in several]
 
 
-def _files(files: Files) -> list[Path]:
+def _files(files: Paths) -> list[Path]:
     return [Path(one) for one in ([files] if isinstance(files, str | Path) else files)]
 
 
-def _runs(runs: Run | str | Path | Sequence[Run | str | Path]) -> list[Path]:
+def _profile(profile: str | Path | None) -> str | None:
+    return None if profile is None else str(profile)
+
+
+def _runs(runs: AnyRuns) -> list[Path]:
+    from shiplog.training.runs.load_model import Run
+
     every = [runs] if isinstance(runs, Run | str | Path) else list(runs)
     return [run.path if isinstance(run, Run) else Path(run) for run in every]

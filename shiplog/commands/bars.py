@@ -24,6 +24,7 @@ from shiplog.nomenclature.numbers import counted
 
 log = logging.getLogger(__name__)
 
+LEAST_BAR, MOST_BAR, WORDS = 4, 40, 50  # letters of a bar, and of what stands beside it
 LINE_S = 30.0  # between two lines where there is no terminal
 LEAST_DONE = 0.02  # share of the work, below which no time left is given: it would be hours off
 # Of a log ingested or a table converted: a first guess that the finished logs correct.
@@ -96,6 +97,7 @@ def _duration(seconds: float) -> str:
 
 
 P = ParamSpec("P")
+T = TypeVar("T")
 R = TypeVar("R")
 
 
@@ -104,14 +106,19 @@ def tracked(
 ) -> Iterator[Path]:
     """The paths in turn, with a bar in which each counts by the seconds that it is expected to
     take, or else by its size."""
-    if not paths:
+    yield from through(paths, title, expected_s or _expected_s)
+
+
+def through(items: Sequence[T], title: str, expected_s: Callable[[T], float]) -> Iterator[T]:
+    """The items in turn, with a bar in which each counts by the seconds that it is expected to
+    take."""
+    if not items:
         return
-    expected = expected_s or _expected_s
-    seconds = {f"{i + 1} of {len(paths)}": expected(p) for i, p in enumerate(paths)}
+    seconds = {f"{i + 1} of {len(items)}": expected_s(item) for i, item in enumerate(items)}
     with _stages(title, seconds):
-        for stage, path in zip(seconds, paths, strict=True):
+        for stage, item in zip(seconds, items, strict=True):
             reach(stage)
-            yield path
+            yield item
 
 
 def staged(title: str, seconds: Mapping[str, float]) -> Callable[[Callable[P, R]], Callable[P, R]]:
@@ -174,9 +181,10 @@ class _StageBar(Progress):
 
     def __init__(self, title: str, schedule: Schedule) -> None:
         self.schedule = schedule
+        console = Console(stderr=True)
         super().__init__(
-            TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:.0f}%"),
-            TextColumn("{task.fields[left]} left"), console=Console(stderr=True), transient=True,
+            TextColumn("{task.description}"), _bar(console), TextColumn("{task.percentage:.0f}%"),
+            TextColumn("{task.fields[left]} left"), console=console, transient=True,
             refresh_per_second=2,
         )  # fmt: skip
         self._title = title
@@ -230,11 +238,17 @@ def _stages(title: str, seconds: Mapping[str, float]) -> Iterator[None]:
 
 
 def _columns() -> Progress:
+    console = Console(stderr=True)
     return Progress(
-        TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:.0f}%"),
-        TimeRemainingColumn(), console=Console(stderr=True), transient=True, refresh_per_second=2,
+        TextColumn("{task.description}"), _bar(console), TextColumn("{task.percentage:.0f}%"),
+        TimeRemainingColumn(), console=console, transient=True, refresh_per_second=2,
         speed_estimate_period=600.0,
     )  # fmt: skip
+
+
+def _bar(console: Console) -> BarColumn:
+    """The bar gives way to its words in a narrow terminal."""
+    return BarColumn(bar_width=max(LEAST_BAR, min(MOST_BAR, console.width - WORDS)))
 
 
 def _expected_s(path: Path) -> float:

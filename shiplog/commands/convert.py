@@ -18,11 +18,12 @@ from shiplog.logs.conversion.copies import is_log
 from shiplog.logs.conversion.heartbeat import saying
 from shiplog.logs.conversion.original import Original, why
 from shiplog.machine import files, reading_limits
-from shiplog.machine.paths import check_there
+from shiplog.machine.paths import check_file, check_there, refuse_taken
 from shiplog.nomenclature.contract import CONTRACT
 from shiplog.nomenclature.numbers import counted
 from shiplog.report.result import Printed
 from shiplog.ship_profile.profile import Column, Profile
+from shiplog.ship_profile.unchecked_lines import unchecked_lines
 
 log = logging.getLogger(__name__)
 
@@ -35,6 +36,10 @@ class Converted(Printed):
     refused: dict[str, str] = field(default_factory=dict)
     lost: dict[str, str] = field(default_factory=dict)
     out: Path | None = None
+
+    def __repr__(self) -> str:
+        made = counted(len(self.logs), "log")
+        return f"Converted({made} in {str(self.out)!r}, {len(self.refused)} refused)"
 
     @property
     def lines(self) -> list[str]:
@@ -64,10 +69,51 @@ def convert(sources: list[Path], profile: Profile | None, out: Path) -> Converte
     return done
 
 
+@dataclass(frozen=True, repr=False)
+class Draft(Printed):
+    """A ship profile that was drafted: `toml` is its text, `written` the file that holds it."""
+
+    toml: str
+    written: Path | None = None
+
+    def __repr__(self) -> str:
+        where = "not written" if self.written is None else str(self.written)
+        return f"Draft({counted(len(self.unchecked), 'key')} to check; {where})"
+
+    @property
+    def unchecked(self) -> tuple[str, ...]:
+        """Keys whose line says CHECK, such as `ship.length_m`: a person has to look them over."""
+        return unchecked_lines(self.toml)
+
+    @property
+    def lines(self) -> list[str]:
+        """The draft itself; once it is written, where."""
+        if self.written is None:
+            return [self.toml]
+        return [f"draft written to {self.written}: look over every line that says CHECK"]
+
+    @property
+    def json(self) -> dict:
+        written = None if self.written is None else str(self.written)
+        return {"contract": CONTRACT, "profile": self.toml, "written": written}
+
+
+def draft_profile(path: Path, out: Path | None = None, vessel: str | None = None) -> Draft:
+    """Draft a profile, and write it to `out` where a path is given. Raises ShiplogError."""
+    if out is not None:
+        refuse_taken(out)
+        out = check_file(out, "--out")
+    (toml,) = [draft(one, vessel) for one in tracked([path], "drafting")]
+    if out is not None:
+        files.write_text(out, toml)
+    return Draft(toml, out)
+
+
 def draft(path: Path, vessel: str | None = None) -> str:
     """TOML text of a profile for a log, a table, or what first has to become a log."""
     reading_limits.begin(path)
-    with saying(f"{path.name}: drafting"), packed.unpacked(path) as source:
+    said = nullcontext() if drawable() else saying(f"{path.name}: drafting")
+    with said, packed.unpacked(path) as source:
         if not path.exists() or is_log(source):
             return draft_log(source, vessel)
         if formats.of(source) is table_rows.FORMAT:

@@ -40,14 +40,17 @@ from shiplog.training.runs.run_checks import (
 from shiplog.training.runs.voyages_to_test import held_back, say_twins
 from shiplog.voyages.store import contradicted, moments
 from shiplog.voyages.store.store import Store
-from shiplog.voyages.windows import windows
+from shiplog.voyages.windows import ship_time, windows
 from shiplog.voyages.windows.split import plan
 from shiplog.voyages.windows.windows import Windows
 
 WINDOWS_SHOWN = 2.0  # windows about a moment: one before it and one after
 
+# seconds of the sample logs' test voyage
+STAGES = {"reading": 1.0, "simulating": 3.0, "coverage": 1.0, "forces": 1.0}
 
-@staged("evaluating", {"reading": 1.0, "simulating": 3.0, "coverage": 1.0, "forces": 1.0})
+
+@staged("evaluating", STAGES)
 def evaluate_runs(
     paths: Sequence[Path],
     store: Store,
@@ -105,6 +108,7 @@ def evaluate_runs(
         forces=_forces(opened, rows),
         contradicted=contradicted.of(store, names),
         datums={name: found for name in names if (found := store.origin(name)[1]) is not None},
+        ship_time=ship_time.of(first.profile.ship.length_m, first.training()),
     )
 
 
@@ -205,6 +209,11 @@ class Comparison(Printed):
         """The Rerun file; None where a picture was asked for, or it could not be written."""
         return self.saved if self.saved is None or self.saved.suffix.lower() == ".rrd" else None
 
+    def __repr__(self) -> str:
+        runs = ", ".join(run.name for run in self.evaluation.runs)
+        on = listed(self.evaluation.voyages, most=3)
+        return f"Comparison({runs} on {on}; recording {self.recording or 'none'})"
+
     @property
     def lines(self) -> list[str]:
         what = "Recording" if self.saved is None else saving.NAMES[self.saved.suffix.lower()]
@@ -227,6 +236,7 @@ class Comparison(Printed):
         return self.saved
 
 
+@staged("comparing", STAGES | {"recording": 2.0})
 def compare_runs(
     paths: Sequence[Path],
     store: Store,
@@ -250,6 +260,7 @@ def compare_runs(
     opened = None
     if moment is not None:
         opened = Moment(*moment, WINDOWS_SHOWN * found.runs[0].config.window)
+    reach("recording")
     lost = save(found)
     saved: Path | None = save_to or found.runs[0].path / "compare.rrd"
     title = f"{found.runs[0].profile.ship.name}: {listed(found.voyages, most=3)}"

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import polars as pl
@@ -14,10 +14,11 @@ from threadpoolctl import threadpool_limits
 
 from shiplog.commands.bars import reach, staged
 from shiplog.exceptions import listed
-from shiplog.nomenclature.contract import CONTRACT
-from shiplog.report.evaluation import tables
+from shiplog.machine import files
+from shiplog.report.evaluation.identification import PAGE, Identification
+from shiplog.report.evaluation.text_table import inert
 from shiplog.report.result import Answer
-from shiplog.simulation import prediction_interval
+from shiplog.simulation import baselines, prediction_interval, scoring
 from shiplog.simulation.sensitivities import Simulator, WindowSeries, losses, rollout
 from shiplog.training.physics import identifiability, physics_files
 from shiplog.training.physics.cross_validation import CrossValidated, cross_validate
@@ -36,8 +37,10 @@ from shiplog.training.runs.run_folder import RunFolder
 from shiplog.training.settings.options import TrainOptions
 from shiplog.training.settings.run_config import Config
 from shiplog.voyages.store.store import Store
+from shiplog.voyages.windows import ship_time, windows
 from shiplog.voyages.windows.split import plan, refuse_shared_rows
 from shiplog.voyages.windows.split_settings import Split
+from shiplog.voyages.windows.windows import Windows
 
 log = logging.getLogger(__name__)
 
@@ -50,7 +53,7 @@ STAGES = {"fit": 15.0, "held-out voyages": 20.0, "held-out days": 1.0, "saving":
 @threadpool_limits.wrap(limits=1, user_api="blas")  # of matrices too small to share out
 def identify_run(
     config: Config, store: Store, out: Path, parameters: Path | None = None
-) -> tuple[Run, list[str]]:
+) -> tuple[Run, Identification]:
     """Identify a physical model, hold voyages out, save the run and say what was found.
 
     Raises ShiplogError.
@@ -62,7 +65,7 @@ def identify_run(
 
 @staged("identifying", STAGES)
 @threadpool_limits.wrap(limits=1, user_api="blas")
-def identify_again(old: RunFolder, out: Path) -> tuple[Run, list[str]]:
+def identify_again(old: RunFolder, out: Path) -> tuple[Run, Identification]:
     """A run once more, from its folder alone: settings, rows, windows and starting values.
 
     Raises ShiplogError.
@@ -76,16 +79,43 @@ def identify_again(old: RunFolder, out: Path) -> tuple[Run, list[str]]:
 
 def _finish(
     run: RunFolder, ready: Prepared, hashes: Mapping[str, str | None], began: float
-) -> tuple[Run, list[str]]:
+) -> tuple[Run, Identification]:
     """The run identified, if that is asked of it, and under its name."""
     chosen: dict = {}
     if not run.config.physics.fit:
-        notes = _keep(run, ready)
+        found = _keep(run, ready)
     else:
-        notes, choices = _identify(run, ready)
+        found, choices = _identify(run, ready)
         chosen = {"chosen": choices}
     done = load_model.of_folder(run.finish(provenance(hashes, began) | chosen))
-    return done, [*notes, *plausible_model.questions(done)]
+    questions = plausible_model.questions(done)
+    rows, size = done.training(), done.config.window
+    ship = ship_time.of(done.profile.ship.length_m, rows)
+    names = (done.profile.actuator_names, done.profile.wind_names)
+    result = Identification(
+        done, found.errors, (*found.sentences, *questions), (*found.doubts, *questions),
+        baseline_losses(windows.cut(rows, done.windows(), size, *names)),
+        (ship.words(size), ship.advice(size)),
+    )  # fmt: skip
+    files.write_text(done.path / PAGE, inert(result.page))
+    return done, result
+
+
+class Found(NamedTuple):
+    """L before and after in a sentence; all sentences; those of them that ask for a look."""
+
+    errors: str
+    sentences: list[str]
+    doubts: list[str]
+
+
+def baseline_losses(cut: Windows) -> dict[str, float]:
+    """Mean L of both baselines on the windows that one of them is fitted to."""
+    fitted = baselines.least_squares(cut)
+    return {
+        name: float(scoring.score(model, cut).errors["loss"].mean())  # type: ignore[arg-type]
+        for name, model in (("hold", baselines.hold), ("least_squares", fitted))
+    }
 
 
 def _begin(
@@ -111,7 +141,7 @@ def _begin(
     return run, ready
 
 
-def _identify(run: RunFolder, ready: Prepared) -> tuple[list[str], dict]:
+def _identify(run: RunFolder, ready: Prepared) -> tuple[Found, dict]:
     """Every seed identified and saved, with its band. Returns what there is to say, and what
     held-out voyages chose."""
     settings = run.config.physics
@@ -127,10 +157,12 @@ def _identify(run: RunFolder, ready: Prepared) -> tuple[list[str], dict]:
 
     held_out = _hold_out(ready, refit, settings.folds)
     notes += held_out.sentences(ready, found, settings.folds)
-    notes += identifiability.describe(
-        found, ready.start.names, ready.start.spread, (ready.start.low, ready.start.high),
-        lambda name: ready.start.entry(name).meaning,
-    )  # fmt: skip
+    names, spread = ready.start.names, ready.start.spread
+    notes += identifiability.separated(
+        found, names, spread, lambda name: ready.start.entry(name).meaning
+    )
+    doubts = identifiability.doubts(found, names, spread, (ready.start.low, ready.start.high))
+    notes += doubts
     reach("saving")
     choices: dict = {"ridge": chosen.as_json()}
     validated = held_out.by_voyage
@@ -142,12 +174,13 @@ def _identify(run: RunFolder, ready: Prepared) -> tuple[list[str], dict]:
             save(run, seed, ready, simulator, done)
             choices |= {f"network of seed {seed}": network.as_json()}
             notes.append(sentence)
+            doubts.append(sentence)
         else:
             save(run, seed, ready, _simulator(ready.model, found), found)
     if held_out.by_voyage is not None:
         run.save_cross_validation(held_out.table())
     _band(run, ready, validated)
-    return notes, choices
+    return Found(held_out.line(ready, found, settings.folds), notes, doubts), choices
 
 
 def _hold_out(
@@ -203,7 +236,7 @@ def _apart(days: list[str], voyages: list[str]) -> bool:
     return len(set(zip(days, voyages, strict=True))) > len(set(days))
 
 
-def _keep(run: RunFolder, ready: Prepared) -> list[str]:
+def _keep(run: RunFolder, ready: Prepared) -> Found:
     """A run of the starting values as they are; no fit has used these errors."""
     nothing = np.zeros((len(ready.start.values),) * 2)
     simulator = Simulator(ready.model, ready.start.values, nothing)
@@ -215,7 +248,8 @@ def _keep(run: RunFolder, ready: Prepared) -> list[str]:
         prediction_interval.calibrate(error, np.zeros_like(states), len(set(ready.voyages)))
     )
     loss = losses(ready.model, ready.start.values, ready.data)
-    return [unfitted_sentence(loss)]
+    sentence = unfitted_sentence(loss)
+    return Found(sentence, [sentence], [])
 
 
 def _simulator(model: Any, found: Identified) -> Simulator:
@@ -243,24 +277,5 @@ def _band(run: RunFolder, ready: Prepared, validated: CrossValidated | None) -> 
 def identify_command(store: Store, out: Path, options: TrainOptions, split: Split) -> Answer:
     """`shiplog train` of a physical model."""
     options = options.without_idle_seeds()
-    run, notes = identify_run(options.config(split), store, out, options.parameters)
-    return answer(run, notes, store.path)
-
-
-def answer(run: Run, notes: Sequence[str], store_path: Path) -> Answer:
-    """What there is to say of an identified run."""
-    identified = run.identified()
-    lines = [f"{run.label} in {run.path}.", *notes, ""]
-    if run.config.physics.fit:
-        lines += [tables.parameters_table(identified), ""]
-    lines.append(f"Next: shiplog evaluate {run.path} --store {store_path}")
-    content = {
-        "contract": CONTRACT,
-        "run": str(run.path),
-        "label": run.label,
-        "windows": run.windows().height,
-        "notes": list(notes),
-        "parameters": identified.to_dicts(),
-        "split": run.config.split.model_dump(mode="json"),
-    }
-    return Answer(lines, content)
+    _, found = identify_run(options.config(split), store, out, options.parameters)
+    return found.answer(store.path)

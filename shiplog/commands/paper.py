@@ -11,6 +11,7 @@ import polars as pl
 
 from shiplog.commands import gpu as on_gpu
 from shiplog.commands import train_networks
+from shiplog.commands.bars import reach, staged, through
 from shiplog.commands.evaluate import evaluate_runs
 from shiplog.exceptions import ShiplogError, listed
 from shiplog.machine import files
@@ -214,7 +215,7 @@ def train_sets(
     elif tasks:
         failures |= train_networks.do(tasks, jobs)
     device = gpu.CPU if there is None else gpu.name(there)
-    for name, one in begun.items():
+    for name, one in through(list(begun.items()), "finishing", lambda _: 1.0):
         if all(one.run.finished(seed) for seed in one.run.config.seeds):
             finished[name] = train_networks.finish(one, device)
     return {name: finished[name] for name in configs if name in finished}, failures
@@ -240,6 +241,7 @@ def collect(finished: dict[str, RunFolder], failures: dict[str, str], store: Sto
     )
 
 
+@staged("writing", {"rows": 1.0, "figures": 8.0, "recording": 1.0})
 def write(results: Results, chosen: Voyages, store: Store, out: Path) -> list[str]:
     """Tables as Parquet, figures as SVG and PNG, report.md and paper.rrd in `out`. Returns the
     report."""
@@ -264,6 +266,7 @@ def write(results: Results, chosen: Voyages, store: Store, out: Path) -> list[st
         "rollouts": rollouts,
     }  # fmt: skip
     pictures: dict[str, Path] = {}
+    reach("figures")
 
     def path(name: str) -> Path:
         pictures[name] = drawn / f"{name.replace(' ', '_')}.png"
@@ -283,6 +286,7 @@ def write(results: Results, chosen: Voyages, store: Store, out: Path) -> list[st
     for name in results.runs:
         if name != "ref" and "ref" in results.runs:
             figures.states(own, measured, ("ref", name), path(f"ref and {name}"))
+    reach("recording")
     for name, frame in frames.items():
         files.write_frame(numbers / f"{name}.parquet", frame)
     lines = report.lines(results, chosen.chosen_by, sizes)

@@ -7,15 +7,19 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import polars as pl
+
 from shiplog.commands.bars import tracked
 from shiplog.commands.convert import Converted, as_logs
 from shiplog.exceptions import ShiplogError
 from shiplog.logs.conversion.bags import MCAP, bags_once, is_bag, only_log
+from shiplog.logs.health import health_report
 from shiplog.logs.health.health_report import Finding, NotCompared, VoyageReport
 from shiplog.logs.reading.check import expected_s, health_of
 from shiplog.logs.reading.read import contents, read
 from shiplog.machine import reading_limits
 from shiplog.machine.unexpected import unexpected
+from shiplog.nomenclature.numbers import counted
 from shiplog.report.evaluation import tables
 from shiplog.report.result import Printed
 from shiplog.ship_profile import file as profiles
@@ -41,6 +45,31 @@ class Ingested(Printed):
     refused: dict[str, ShiplogError] = field(default_factory=dict)
     lost: dict[str, str] = field(default_factory=dict)
     store: Store | None = None
+
+    def __repr__(self) -> str:
+        taken = (
+            f"{counted(len(self.reports), 'voyage')}, {counted(self.findings.height, 'finding')}"
+        )
+        into = "only checked" if self.store is None else f"in {str(self.store.path)!r}"
+        return f"Ingested({taken}, {len(self.refused)} refused, {into})"
+
+    @property
+    def voyages(self) -> pl.DataFrame:
+        """One row a log that was taken: name, seconds, usable_s, windows, messages_read,
+        messages_lost, findings."""
+        kept = ("name", "seconds", "usable_s", "windows", "messages_read", "messages_lost")
+        rows = [
+            {key: getattr(report, key) for key in kept} | {"findings": len(report.findings)}
+            for report in self.reports
+        ]
+        numbers = {"name": pl.String, "seconds": pl.Float64}
+        return pl.DataFrame(rows, {k: numbers.get(k, pl.Int64) for k in (*kept, "findings")})
+
+    @property
+    def findings(self) -> pl.DataFrame:
+        """One row a finding: voyage, kind, channel, sentence, start_s, end_s, value, low, high,
+        unit, reason."""
+        return health_report.frame({report.name: report.findings for report in self.reports})
 
     @property
     def lines(self) -> list[str]:

@@ -32,8 +32,8 @@ def _physics(old: RunFolder, out: Path, store_path: Path) -> Answer:
     with loading():
         from shiplog.commands import identify
 
-    run, notes = identify.identify_again(old, out)
-    return identify.answer(run, notes, store_path)
+    _, found = identify.identify_again(old, out)
+    return found.answer(store_path)
 
 
 FLOWS = {NETWORK.name: _network, PHYSICS.name: _physics}

@@ -32,7 +32,7 @@ from shiplog.training.runs.run_folder import RunFolder
 from shiplog.training.settings.options import TrainOptions
 from shiplog.training.settings.run_config import Config
 from shiplog.voyages.store.store import Store
-from shiplog.voyages.windows import windows
+from shiplog.voyages.windows import ship_time, windows
 from shiplog.voyages.windows.split import plan, refuse_shared_rows
 from shiplog.voyages.windows.split_settings import Split
 
@@ -175,8 +175,10 @@ def answer(run: Run, store_path: Path) -> Answer:
     config = run.config
     best = {seed: float(run.history(seed)["validation"].min()) for seed in config.seeds}  # type: ignore[arg-type]
     line = ", ".join(f"{loss:.0f}" for loss in best.values())
+    advice = ship_time.of(run.profile.ship.length_m, run.training()).advice(config.window)
     lines = (
         f"{run.label} in {run.path}: best validation L {line} (seeds 0 to {config.seeds[-1]}).",
+        *([advice] if advice else []),
         f"Split by {config.split.chosen_by}. "
         f"Next: shiplog evaluate {run.path} --store {store_path}",
     )

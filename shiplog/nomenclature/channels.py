@@ -54,6 +54,7 @@ WIND = (WIND_SPEED, WIND_ANGLE)  # the paper's ω ∈ R²
 
 WINDOW = 100  # s, the paper's I at 1 Hz, unless a run has another
 LEAST_WINDOW = 6  # s: a hybrid differences velocities over 5 s, and the baseline over two
+AUTO_WINDOW = "auto"  # instead of a length: as long as the ship needs
 WEIGHTS = (0.0, 100.0, 0.0, 100.0, 0.0, 10.0)  # w of Eq. 5, yaw rate in deg/s
 JITTER = (0.0, 0.01, 0.0, 0.01, 0.0, math.radians(0.1))  # √diag Σ_x of Table 5, SI
 VELOCITY_WEIGHTS = (100.0, 100.0, 10.0 * 180.0 / math.pi)  # the same w, for ν in SI

@@ -43,6 +43,17 @@ def unix_unit(count: float) -> str | None:
     )
 
 
+# Letters in which case decides: another unit, which no channel has.
+CASED = {"kN": "kilonewtons, and a knot is 'kn'", "M": "nautical miles, and a metre is 'm'"}
+_ANY_CASE = {unit.lower(): unit for unit in TO_SI}
+
+
+def spelled(unit: str) -> str:
+    """The unit as it is called here, of one in any letter case: `M/S`, `Deg`, `KN`. Any other text,
+    and one of `CASED`, as it is."""
+    return unit if unit in CASED else _ANY_CASE.get(unit.lower(), unit)
+
+
 def measure(unit: str) -> str | None:
     """What `unit` measures; None for a unit not in the table."""
     return next((name for name, units in MEASURES.items() if unit in units), None)
@@ -51,8 +62,9 @@ def measure(unit: str) -> str | None:
 def factor(unit: str) -> float:
     """What a value in `unit` is multiplied by. Raises ProfileError for a unit not in the table."""
     if unit not in TO_SI:
+        meant = f": {CASED[unit]}" if unit in CASED else nearest(unit, TO_SI)
         raise ProfileError(
-            f"The unit {unit!r} is not known{nearest(unit, TO_SI)}.",
+            f"The unit {unit!r} is not known{meant}.",
             hint=f"use one of: {listed(TO_SI, most=40)}.",
         )
     return TO_SI[unit]

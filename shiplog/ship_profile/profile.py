@@ -25,6 +25,7 @@ from shiplog.ship_profile.sources import (
     Sensor,
     Sensors,
     Source,
+    Unit,
     require_factor,
 )
 from shiplog.ship_profile.table_channels import TABLE_CHANNELS, TABLE_LABELS
@@ -104,7 +105,7 @@ class Column(Section):
     """One column of a table that `convert` turns into a log: a key of [table] is its name."""
 
     channel: str = Field(description="what it holds; see the channels below")
-    unit: str | None = Field(
+    unit: Unit | None = Field(
         default=None, description='of numbers, such as "deg" or "kn"; SI where left out; a '
         'latitude or longitude needs it. Of a time "s", "ms", "us", "ns", "min", "h" '
         'or "d" (days, also those that a spreadsheet, MATLAB or astronomers count); without one it '

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from shiplog.exceptions import listed
 from shiplog.nomenclature import units
@@ -20,6 +20,7 @@ from shiplog.ship_profile.toml_section import Section
 
 Clock = Literal["message", "log", "publish"]
 Accuracy = Annotated[float, Field(ge=0, le=1e6)]
+Unit = Annotated[str, AfterValidator(units.spelled)]  # in any letter case
 FINEST = 1e-9  # in `unit`: a smaller accuracy than this, but for 0, is a slip
 FACTORS = (1e-12, 1e6)  # of a raw value: from 1e-7 deg of a receiver to a count of thousands
 Number = Annotated[float, Field(ge=-1e12, le=1e12)]  # in whatever unit an instrument counts
@@ -56,10 +57,10 @@ class Source(Section):
         "a dot goes into a part of it"
     )  # fmt: skip
     field: str | None = Field(default=None, description="the same where there is one value")
-    unit: str | None = Field(
+    unit: Unit | None = Field(
         default=None, description="of all values; SI where left out; a geodetic position needs it"
     )  # fmt: skip
-    units: tuple[str, ...] = Field(default=(), description="one for each of `fields`")
+    units: tuple[Unit, ...] = Field(default=(), description="one for each of `fields`")
     sign: float | tuple[float, ...] = Field(
         default=1.0,
         description="-1 turns the values round, and any other number is a factor on "

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from command_desk import judge
 
-from shiplog.cli import output
+from shiplog.cli.terminal_tables import drawn
 from shiplog.exceptions import ShiplogError
 from shiplog.machine import files
 from shiplog.machine.paths import check_file
@@ -82,8 +82,8 @@ def test_a_voyage_that_cannot_be_read_is_lost_from_the_list(desk, capsys, caplog
 
 
 def test_blank_cells_and_bars_in_cells_are_drawn_in_their_columns():
-    drawn = output._drawn(table(("a", "L of x | y"), [("", 1.5), ("p|q", 2.0)]))
-    assert [column.header.plain for column in drawn.columns] == ["a", "L of x | y"]
-    cells = [[cell.plain for cell in column.cells] for column in drawn.columns]
+    (block,) = drawn(table(("a", "L of x | y"), [("", 1.5), ("p|q", 2.0)]), 80)
+    assert [column.header.plain for column in block.columns] == ["a", "L of x | y"]
+    cells = [[cell.plain for cell in column.cells] for column in block.columns]
     assert cells == [["", "p|q"], ["1.5", "2"]]
-    assert [column.justify for column in drawn.columns] == ["left", "right"]
+    assert [column.justify for column in block.columns] == ["left", "right"]

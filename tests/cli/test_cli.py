@@ -12,6 +12,10 @@ import sailing
 from commands import call
 
 from pipelines.experiments import simulated_ship
+from shiplog import cli
+from shiplog.cli import app
+from shiplog.commands import train as training
+from shiplog.report.result import Answer
 
 FAST = ("--window", "40", "--width", "12", "--epochs", "8")
 
@@ -186,6 +190,19 @@ def test_the_list_of_commands_has_whole_sentences():
     assert all(line.endswith(".") and not line.endswith("...") for line in lines)
 
 
+@pytest.mark.parametrize("command", ["", *sorted(c.__name__ for c in app.COMMANDS)])
+def test_help_is_whole_at_60_columns(command, monkeypatch, capsys):
+    """The same words as in a wide terminal, and no line that is wider than it."""
+    words = []
+    for width in (60, 200):
+        monkeypatch.setenv("COLUMNS", str(width))
+        assert cli.run([*filter(None, [command]), "--help"]) == 0
+        reported = capsys.readouterr().out
+        assert all(len(line) <= width for line in reported.splitlines())
+        words.append(reported.split())
+    assert words[0] == words[1]
+
+
 def test_versions_and_the_short_word_for_help():
     code, reported, _ = call("--version")
     assert code == 0 and reported.startswith("shiplog 0.") and "Rerun 0." in reported
@@ -347,3 +364,34 @@ def test_the_demo_needs_its_logs(tmp_path, monkeypatch):
     empty.mkdir()
     code, _, reported = call("demo", "--no-view", "--logs", empty, "--out", tmp_path / "demo")
     assert code == 1 and "No log in" in reported
+
+
+@pytest.mark.parametrize("named", [(), ("--model", "feedforward")])
+def test_train_without_a_model_says_which_one_and_which_to_begin_with(
+    store, tmp_path, monkeypatch, named
+):
+    """Before the work; whoever names the model knows."""
+    monkeypatch.setattr(training, "train_command", lambda *_: Answer((), {}))
+    code, _, told = call("train", "--store", store, "--out", tmp_path / "run", *named)
+    assert code == 0
+    assert ("trains feedforward" in told and "--model mmg" in told) == (not named)
+
+
+def test_a_window_is_seconds_or_auto(store, tmp_path, monkeypatch):
+    given = []
+    monkeypatch.setattr(training, "train_command", lambda *a: given.append(a[2]) or Answer((), {}))
+    for word in ("40", "auto"):
+        out = tmp_path / word
+        assert call("train", "--store", store, "--out", out, "--window", word)[0] == 0
+    assert [one.window for one in given] == [40, "auto"]
+
+
+def test_auto_is_resolved_before_the_run_is_made(store, tmp_path, monkeypatch):
+    """3 m at less than 0.6 m/s: 100 s, which the run has in its settings."""
+    made = []
+    monkeypatch.setitem(
+        training.FLOWS, "physics",
+        (training.choose_physical_split, lambda *a: made.append(a[2]) or Answer((), {})),
+    )  # fmt: skip
+    call("train", "--model", "mmg", "--store", store, "--out", tmp_path / "r", "--window", "auto")
+    assert [one.window for one in made] == [100]

@@ -1,8 +1,12 @@
 """The time left of stages and of queues, against clocks that are set by hand."""
 
+import io
+import re
+import sys
+
 import pytest
 
-from shiplog.commands import bars
+from shiplog.commands import bars, diagnose, evaluate, identify
 from shiplog.commands.bars import Schedule
 
 STAGES = {"nominal voyages": 60.0, "hypotheses": 30.0, "report": 10.0}
@@ -72,3 +76,50 @@ def test_what_an_interrupted_training_had_done_is_no_speed(clock, caplog):
     assert [r.getMessage() for r in caplog.records] == [
         "0 of 1 trainings done, 85%; about 5 min left"
     ]
+
+
+# --- in a narrow terminal
+
+
+def terminal(monkeypatch):
+    """Standard error as a terminal of 60 columns, kept as text."""
+    stream = io.StringIO()
+    stream.isatty = lambda: True  # type: ignore[method-assign]
+    monkeypatch.setenv("COLUMNS", "60")
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr(sys, "stderr", stream)
+    return stream
+
+
+@pytest.mark.parametrize("stages", [diagnose.STAGES, identify.STAGES, evaluate.STAGES])
+def test_a_bar_says_everything_at_60_columns(monkeypatch, stages):
+    shown = terminal(monkeypatch)
+
+    @bars.staged("diagnosing", stages)
+    def work():
+        for stage in stages:
+            bars.reach(stage)
+            bars._CURRENT.get().refresh()
+
+    work()
+    text = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", shown.getvalue()).replace("\r", "\n")
+    lines = [line.rstrip() for line in text.splitlines()]
+    assert "…" not in text and all(len(line) <= 60 for line in lines)
+    for stage in stages:
+        own = [line for line in lines if f"diagnosing: {stage}" in line]
+        assert own and all("% " in line and line.endswith("left") for line in own), text
+
+
+def test_items_are_gone_through_with_their_expected_seconds(monkeypatch):
+    terminal(monkeypatch)
+    seen = []
+    for item in bars.through(["a", "bb"], "comparing", len):
+        seen.append(item)
+        assert bars._CURRENT.get().schedule._seconds == {"1 of 2": 1, "2 of 2": 2}
+    assert seen == ["a", "bb"] and bars._CURRENT.get() is None
+    assert list(bars.through([], "comparing", len)) == []
+
+
+def test_a_file_gets_no_bar(capsys):
+    assert list(bars.through(["a"], "comparing", len)) == ["a"]
+    assert capsys.readouterr().err == ""

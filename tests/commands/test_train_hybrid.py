@@ -33,7 +33,7 @@ def hybrid(store):
 def test_a_hybrid_is_judged_on_held_out_voyages_and_says_so(hybrid):
     run, reported = hybrid
     assert run.label == "hybrid identified on ref, without propeller, rudder, wind"
-    (sentence,) = [s for s in reported if s.startswith("Seed 0")]
+    (sentence,) = [s for s in reported.notes if s.startswith("Seed 0")]
     assert "adds nothing that survives" in sentence or "on 6 held-out windows" in sentence
     assert run.band() is not None
 

@@ -87,7 +87,8 @@ def test_it_is_trained_evaluated_compared_and_diagnosed(kt, tmp_path):
     both = ("--voyages", "trip_1", "--voyages", "trip_2")
     code, reported, _ = call("train", "--model", "kt", "--store", store, "--out", run, *both,
                          "--window", 25, "--folds", 2)  # fmt: skip
-    assert code == 0 and "kt identified on ref" in reported and "turning ability" in reported
+    assert code == 0 and "kt identified on ref" in reported
+    assert "turning ability" in (run / "training.md").read_text(encoding="utf-8")
     code, _, reported = call("train", "--model", "kt", "--store", store, "--out", tmp_path / "w",
                          "--width", 8)  # fmt: skip
     assert code == 2 and "says nothing to a physical model" in reported

@@ -64,7 +64,7 @@ def test_the_part_on_the_verdict_is_what_the_code_writes():
         "python -m pipelines.experiments.verdict_reference --markdown docs/reference/answers.md"
     )
     empty = Verdict("none", "", "run", True, "").as_json()
-    written = {*empty, "structure", "gain", "recording"} - {"contract"}
+    written = {*empty, "structure", "gain", "subject", "recording"} - {"contract"}
     assert written == verdict_reference.KEYS.keys()
 
 

@@ -8,11 +8,11 @@ from types import SimpleNamespace
 import pytest
 import sailing
 
-from shiplog.commands import api, diagnose
+from shiplog.commands import prepare
 from shiplog.diagnosis.residual.interval import Interval
 from shiplog.exceptions import StoreError
 from shiplog.logs.health.health_report import VoyageReport
-from shiplog.report.diagnosis.diagnosis import Diagnosis
+from shiplog.report.diagnosis import page
 from shiplog.report.diagnosis.verdict import Verdict
 from shiplog.report.evaluation.text_table import inert, table
 from shiplog.report.viewer import album, diagnosis, report
@@ -55,17 +55,16 @@ def test_markdown_of_a_name_is_displayed_and_not_done(name):
     )
 
 
-def test_the_report_of_a_diagnosis(tmp_path):
+def test_the_report_of_a_diagnosis():
     intervals = (Interval(HTML, 100.0, 200.0, "external", f"pushed by {LINK}"),)
     verdict = Verdict("none", f"Nothing in {PICTURE}.", HTML, False, "", intervals=intervals)
-    diagnose._write(Diagnosis(verdict, tmp_path))
-    text = (tmp_path / "report.md").read_text(encoding="utf-8")
+    text = page.written(verdict).replace(page.TERMS_FOLD, "")
     assert "onerror" in text and "javascript" in text and harmless(text)
 
 
 def test_a_notebook():
     found = VoyageReport(HTML, 1, 0, 10, 1.0)
-    output = api.Ingested([found], store=Store("store"))._repr_markdown_()
+    output = prepare.Ingested([found], store=Store("store"))._repr_markdown_()
     assert "onerror" in output and harmless(output)
 
 

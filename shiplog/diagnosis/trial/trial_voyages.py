@@ -26,7 +26,6 @@ from shiplog.voyages.windows.split import plan
 from shiplog.voyages.windows.windows import Windows
 
 BOTTOM_MAP_PLACES = 12  # of a map of the bottom
-WORKING = 0.95  # quantile of the speed: a ship that waits at a berth is no slower for it
 
 
 def voyages_of(run: Run, store: Store, wanted: Sequence[str]) -> list[str]:
@@ -59,7 +58,8 @@ def in_ship_time(
         return nominal, recorded
     _, main, _ = mmg.geometry_of(run.profile, run.config.physics.without)
     shorter = min(one.seconds for one in (reference, recorded))
-    working = float(np.quantile(np.linalg.norm(reference.state[:, [1, 3]], axis=1), WORKING))
+    speeds = np.linalg.norm(reference.state[:, [1, 3]], axis=1)
+    working = float(np.quantile(speeds, timescale.WORKING))
     of = timescale.of_ship(main.length, working, shorter)
     changed = None if nominal is None else replace(nominal, timescale=of)
     return changed, replace(recorded, timescale=of)

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import polars as pl
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,3 +143,17 @@ class VoyageReport:
             "findings": [asdict(finding) for finding in self.findings],
             "not_compared": [asdict(one) for one in self.not_compared],
         }
+
+
+def frame(findings: Mapping[str, Sequence[Finding]]) -> pl.DataFrame:
+    """One row a finding: its voyage, then its fields.
+
+    findings   voyage → what was found in it
+    """
+    import polars as pl
+
+    numbers = ("start_s", "end_s", "value", "low", "high")
+    names = [one.name for one in fields(Finding)]
+    schema = {"voyage": pl.String} | {n: pl.Float64 if n in numbers else pl.String for n in names}
+    rows = [{"voyage": name, **asdict(one)} for name, many in findings.items() for one in many]
+    return pl.DataFrame(rows, schema)

@@ -13,8 +13,10 @@ from shiplog.diagnosis.trial.trial import Trial
 from shiplog.diagnosis.verdict.held_out import HeldOut
 from shiplog.diagnosis.verdict.result import Decision
 from shiplog.report.diagnosis import page
+from shiplog.report.diagnosis.sections.causes import Estimate
 from shiplog.report.diagnosis.verdict import Verdict
 from shiplog.report.result import Printed
+from shiplog.simulation.error_reduction import Gain
 from shiplog.simulation.extended_simulator import ExtendedSimulator
 from shiplog.training.runs.load_model import Run
 
@@ -47,6 +49,37 @@ class Diagnosis(Printed):
     drawn: bool = True
     extended: Run | None = None
     datums: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        named = ", ".join(self.named) or "no cause"
+        return f"Diagnosis({self.verdict.run}: {self.verdict.verdict}, {named}; {self.folder})"
+
+    @property
+    def sentence(self) -> str:
+        """The answer in words."""
+        return self.verdict.sentence
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Names of the causes, the most certain first; none where no cause is named."""
+        return tuple(cause.name for cause in self.verdict.causes)
+
+    @property
+    def parameters(self) -> dict[str, dict[str, Estimate]]:
+        """Cause → parameter → value, low, high (90 % interval), unit:
+        `found.parameters["current"]["speed"].value`."""
+        return {cause.name: dict(cause.parameters) for cause in self.verdict.causes}
+
+    @property
+    def gain(self) -> Gain | None:
+        """L before and after on held-out windows, and its reduction with a 90 % interval; None
+        where nothing was held out."""
+        return self.verdict.gain
+
+    @property
+    def explained(self) -> float:
+        """Share of the held-out error that the named causes take away, 0 to 1."""
+        return self.verdict.explained
 
     @property
     def report(self) -> Path:

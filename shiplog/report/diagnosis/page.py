@@ -19,6 +19,11 @@ from shiplog.report.diagnosis.terms import TERMS
 from shiplog.report.diagnosis.verdict import Verdict
 from shiplog.report.evaluation.text_table import inert
 
+TERMS_FOLD = (
+    "<details>\n<summary>Terms of the method</summary>\n\n"
+    + "\n".join(f"- **{term}**: {text}" for term, text in TERMS)
+    + "\n\n</details>\n"
+)
 SECTIONS = (  # in the order of the page
     lambda v: causes.markdown(v.causes),
     lambda v: gain.markdown(v.gain, v.without),
@@ -54,6 +59,4 @@ def markdown(verdict: Verdict) -> str:
 def written(verdict: Verdict) -> str:
     """The file: without anything that a viewer of Markdown would load, and with the terms of the
     method to unfold at its end."""
-    terms = "\n".join(f"- **{term}**: {text}" for term, text in TERMS)
-    fold = f"<details>\n<summary>Terms of the method</summary>\n\n{terms}\n\n</details>\n"
-    return f"{inert(markdown(verdict))}\n{fold}"
+    return f"{inert(markdown(verdict))}\n{TERMS_FOLD}"

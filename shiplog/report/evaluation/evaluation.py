@@ -3,26 +3,61 @@ tables and JSON."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import polars as pl
 
-from shiplog.exceptions import listed
+from shiplog.exceptions import RunNotEvaluated, SeveralRuns, listed
 from shiplog.nomenclature.contract import CONTRACT
-from shiplog.nomenclature.numbers import counted
+from shiplog.nomenclature.numbers import counted, figure
 from shiplog.report.evaluation import tables
 from shiplog.report.evaluation.judgement import MEANING, Judgement, force_line, judge
 from shiplog.report.result import Printed
 from shiplog.training.runs.load_model import Run
 from shiplog.voyages.store import contradicted
 from shiplog.voyages.store.contradicted import Contradicted
+from shiplog.voyages.windows.ship_time import ShipTime
+
+
+@dataclass(frozen=True)
+class RunScores:
+    """How far off one run is on the windows of an evaluation.
+
+    loss             L (Eq. 8 of Wakita et al. 2024): mean over windows, then over seeds
+    seeds            L of each seed
+    rmse             surge, sway [m/s], yaw_rate [rad/s]
+    end_position_m   mean distance at the end of a window [m]
+    end_heading_deg  mean error of the heading there [deg]
+    voyages          voyage → loss, windows, coverage (0 to 1)
+    band_90          channel → share of the samples inside the run's 90 % band
+    judgement        against both baselines with 90 % intervals, and medians in lengths of the ship
+    """
+
+    run: str
+    loss: float
+    seeds: tuple[float, ...]
+    windows: int
+    rmse: dict[str, float]
+    end_position_m: float
+    end_heading_deg: float
+    voyages: dict[str, dict[str, float]]
+    band_90: dict[str, float]
+    judgement: Judgement
+
+    @property
+    def sentence(self) -> str:
+        return self.judgement.sentence
 
 
 @dataclass(frozen=True, repr=False)
 class Evaluation(Printed):
     """Every run and both baselines on the same measured windows.
+
+    `evaluation["mmg"]` is a run's `RunScores`, and `for scores in evaluation` goes through them.
+    Of one run they are attributes, too: `evaluation.loss`, `evaluation.rmse`.
 
     errors     one row per run, seed and window: voyage, elapsed [s], loss (L, Eq. 8 of Wakita et
                al. 2024), RMSE of surge and sway [m/s] and yaw rate [rad/s], how far off the end is
@@ -37,6 +72,7 @@ class Evaluation(Printed):
     forces     of the first physical run along the voyages, as ComparisonData has them; or None
     datums     voyage → latitude and longitude [deg] of its x₀ = y₀ = 0, where its log had them
     contradicted   what was recorded on these voyages and contradicts itself
+    ship_time      L/U of the first run's training voyages
     """
 
     runs: tuple[Run, ...]
@@ -51,6 +87,89 @@ class Evaluation(Printed):
     forces: pl.DataFrame | None
     contradicted: tuple[Contradicted, ...] = ()
     datums: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    ship_time: ShipTime | None = None
+
+    def __getitem__(self, run: str) -> RunScores:
+        """One run's scores, by its name. Raises RunNotEvaluated."""
+        for one in self.runs:
+            if one.name == run:
+                return self._scores(one)
+        raise RunNotEvaluated(run, [one.name for one in self.runs])
+
+    def __iter__(self) -> Iterator[RunScores]:
+        return (self._scores(run) for run in self.runs)
+
+    def __len__(self) -> int:
+        return len(self.runs)
+
+    def _scores(self, run: Run) -> RunScores:
+        found = self.answer(run)
+        kept = ("loss", "windows", "rmse", "end_position_m", "end_heading_deg", "voyages")
+        return RunScores(
+            run=run.name, seeds=tuple(found["seeds"]), band_90=found["band_90"],
+            judgement=self.judgement(run), **{key: found[key] for key in kept},
+        )  # fmt: skip
+
+    def _of_one(self, what: str) -> Any:
+        """Of the one run that was evaluated. Raises SeveralRuns where there are more."""
+        first, *others = self.runs
+        if others:
+            raise SeveralRuns(what, [run.name for run in self.runs])
+        return getattr(self._scores(first), what)
+
+    @property
+    def loss(self) -> float:
+        """Mean L of the run. Of several runs: `evaluation["mmg"].loss`."""
+        return self._of_one("loss")
+
+    @property
+    def rmse(self) -> dict[str, float]:
+        """RMSE of the run: surge, sway [m/s], yaw_rate [rad/s]."""
+        return self._of_one("rmse")
+
+    @property
+    def end_position_m(self) -> float:
+        """Mean distance of the run at the end of a window [m]."""
+        return self._of_one("end_position_m")
+
+    @property
+    def end_heading_deg(self) -> float:
+        """Mean error of the run's heading at the end of a window [deg]."""
+        return self._of_one("end_heading_deg")
+
+    @property
+    def baselines(self) -> dict[str, float]:
+        """Mean L of `hold` (the velocity is held) and of `least_squares` (quadratic)."""
+        return self.means
+
+    @property
+    def windows(self) -> int:
+        """On which every run was scored."""
+        return len(next(iter(self.baseline_losses.values())))
+
+    @property
+    def summary(self) -> pl.DataFrame:
+        """One row a run and baseline: name, loss, rmse_surge, rmse_sway [m/s], rmse_yaw_rate
+        [rad/s], end_position_m, end_heading_deg, share_of_hold, share_of_least_squares."""
+        rows = []
+        for one in self:
+            shares = {a.baseline: a.share for a in one.judgement.against}
+            rows.append(
+                {"name": one.run, "loss": one.loss}
+                | {f"rmse_{key}": value for key, value in one.rmse.items()}
+                | {"end_position_m": one.end_position_m, "end_heading_deg": one.end_heading_deg}
+                | {f"share_of_{name}": shares.get(name) for name in self.baselines}
+            )
+        nothing = dict.fromkeys(rows[0])
+        rows += [nothing | {"name": key, "loss": loss} for key, loss in self.baselines.items()]
+        schema = {name: pl.String if name == "name" else pl.Float64 for name in rows[0]}
+        return pl.DataFrame(rows, schema)
+
+    def __repr__(self) -> str:
+        losses = ", ".join(f"{one.run} L {figure(one.loss, 3)}" for one in self)
+        on = f"{counted(self.windows, 'window')} of {listed(self.voyages, most=3)}"
+        than = ", ".join(f"{name} {figure(loss, 3)}" for name, loss in self.baselines.items())
+        return f"Evaluation({losses}; {than}; {on})"
 
     @property
     def json(self) -> dict:
@@ -75,6 +194,13 @@ class Evaluation(Printed):
             "band_90": dict(shares.iter_rows()),
             "winds": tables.winds(errors).drop("run").to_dicts(),
         }
+
+    @property
+    def window_advice(self) -> str:
+        """A sentence where the length of the windows does not suit the ship; else empty."""
+        if self.ship_time is None:
+            return ""
+        return self.ship_time.advice(self.runs[0].config.window)
 
     @property
     def warning(self) -> str:
@@ -103,6 +229,7 @@ class Evaluation(Printed):
         lines = [
             *([self.warning] if self.warning else []),
             *[self.judgement(run).sentence for run in self.runs],
+            *([self.window_advice] if self.window_advice else []),
             "",
             f"{MEANING} Means over {count} and over seeds:",
             "",

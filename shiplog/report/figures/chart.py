@@ -22,6 +22,7 @@ MOST_HULLS = {"closeup": 10, "voyage": 24}  # on one track: more would hide the 
 ROOM = {"closeup": 2.0, "voyage": 0.35}
 SHAPE = 1.15  # width of a chart over its height
 METRES_PER_DEGREE = 111_320.0  # of latitude, and of longitude at the equator
+MOST_WINDOWS = 100  # with a track on the chart of a voyage
 GAP_S = 2.5  # s between rows of a second each, from which a track is broken
 FEW = 1e-9
 
@@ -64,10 +65,19 @@ def _lines(measured: pl.DataFrame, tracks: pl.DataFrame) -> pl.DataFrame:
     keep = ["line", "voyage", "piece", "time", "x0", "y0", "heading"]
     gap = pl.col("time").diff().fill_null(0.0) > GAP_S
     first = measured.with_columns(line=pl.lit(MEASURED), piece=gap.cum_sum().cast(pl.Int64))
-    others = tracks.filter(pl.col("model") != MEASURED).with_columns(
-        line=pl.col("model"), piece=pl.col("window")
+    others = (
+        _few(tracks)
+        .filter(pl.col("model") != MEASURED)
+        .with_columns(line=pl.col("model"), piece=pl.col("window"))
     )
     return pl.concat([first.select(keep), others.select(keep)])
+
+
+def _few(tracks: pl.DataFrame) -> pl.DataFrame:
+    """Of very many windows of a voyage evenly spaced ones: more would hide each other."""
+    count = tracks.select("voyage", "window").n_unique()
+    step = -(-count // MOST_WINDOWS)
+    return tracks if step <= 1 else tracks.filter(pl.col("window") % step == 0)
 
 
 def draw_closeup(axes: Axes, table: pl.DataFrame, content: Content) -> None:

@@ -17,6 +17,7 @@ from shiplog.report.figures import (
     errors,
     forces,
     style,
+    tables,
     timeline,
     windows,
 )
@@ -98,7 +99,7 @@ def named(content: Content) -> Iterator[tuple[str, Picture, Content]]:
 
 
 def save(content: Content, folder: Path) -> list[Path]:
-    """Each picture as SVG, PDF and PNG, and its rows as Parquet."""
+    """Each picture as SVG, PDF and PNG, and its rows as Parquet; tables as CSV and LaTeX."""
     folder.mkdir(parents=True, exist_ok=True)
     made = []
     for name, picture, own in named(content):
@@ -109,4 +110,4 @@ def save(content: Content, folder: Path) -> list[Path]:
         made += style.write(figure(kind, own), folder / name)
         files.write_frame(folder / f"{name}.parquet", table)
         made.append(folder / f"{name}.parquet")
-    return made
+    return made + tables.save(content, folder)

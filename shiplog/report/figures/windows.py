@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import polars as pl
 
+from shiplog.nomenclature.numbers import counted
 from shiplog.report import colours
 from shiplog.report.figures.chart import legend
 from shiplog.report.figures.content import Content, Picture
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 FEW_TICKS = 4  # voyages whose names stand next to each other
+MOST_WINDOWS = 300  # that are drawn
 MOST_TICKS = 8  # voyages with a name under the axis; more would overlap
 
 
@@ -22,7 +24,22 @@ def table(content: Content) -> pl.DataFrame:
     in which a model diverges."""
     rows = content.data.errors.drop_nulls("loss")
     order = rows.select("voyage", "window").unique(maintain_order=True).with_row_index("place")
-    return rows.join(order, on=["voyage", "window"], maintain_order="left")
+    return _few(rows.join(order, on=["voyage", "window"], maintain_order="left"))
+
+
+def _few(rows: pl.DataFrame) -> pl.DataFrame:
+    """Of very many windows, of each few in a row those with the least and the largest L of any
+    model, so that no extreme is lost."""
+    step = -(-2 * rows["place"].n_unique() // MOST_WINDOWS)
+    if step <= 1:
+        return rows
+    loss = pl.col("loss")
+    kept = rows.group_by(pl.col("place") // step).agg(
+        pl.col("place").get(loss.arg_min()).alias("least"),
+        pl.col("place").get(loss.arg_max()).alias("most"),
+    )
+    places = {*kept["least"].to_list(), *kept["most"].to_list()}
+    return rows.filter(pl.col("place").is_in(list(places)))
 
 
 def draw(axes: Axes, rows: pl.DataFrame, content: Content) -> None:
@@ -56,11 +73,13 @@ def _short(name: str) -> str:
 def words(rows: pl.DataFrame, content: Content) -> str:
     if rows.is_empty():
         return "No window was simulated."
-    means = dict(rows.group_by("model").agg(pl.col("loss").mean()).iter_rows())
+    every = content.data.errors.drop_nulls("loss")
+    means = dict(every.group_by("model").agg(pl.col("loss").mean()).iter_rows())
     text = ", ".join(
         f"{means[key]:.0f} of {label}" for key, label, _ in legend(content.data) if key in means
     )
-    return f"L of {rows['place'].n_unique()} windows; in the mean {text}."
+    count = every.select("voyage", "window").n_unique()
+    return f"L of {counted(count, 'window')}; in the mean {text}."
 
 
 OF_WINDOWS = Picture("Every window", table, draw, words)

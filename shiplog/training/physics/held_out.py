@@ -54,10 +54,22 @@ class HeldOutErrors(NamedTuple):
             _sentence(f"windows of held-out {name}", self.before, one.loss)
             for name, one in self.parts
         ]
-        if self.by_voyage is None:
-            why = "One voyage only" if folds > 1 else "--folds is below two"
-            notes.append(f"{why}: nothing was held out, so the gain is not tested.")
-        return notes
+        return [*notes, untested] if (untested := self._untested(folds)) else notes
+
+    def _untested(self, folds: int) -> str:
+        if self.by_voyage is not None:
+            return ""
+        why = "One voyage only" if folds > 1 else "--folds is below two"
+        return f"{why}: nothing was held out, so the gain is not tested."
+
+    def line(self, ready: Prepared, found: Identified, folds: int) -> str:
+        """Mean L before the fit, after it and on what is held out; the windows that diverge are
+        counted, and are in no mean."""
+        after = losses(ready.model, found.values, ready.data)
+        means = [("before the fit", self.before), ("fitted", after)]
+        means += [(f"on held-out {name}", one.loss) for name, one in self.parts]
+        each = ", ".join(f"{_mean(loss)} {when}" for when, loss in means)
+        return f"Mean L: {each}. {self._untested(folds)}".rstrip()
 
     def table(self) -> pl.DataFrame:
         """A row a window: held_out (voyages or days), group, window, start, loss."""
@@ -78,6 +90,12 @@ class HeldOutErrors(NamedTuple):
 def unfitted_sentence(loss: np.ndarray) -> str:
     """Of starting values that stay as they are: L of every window [N]."""
     return f"Mean L {loss.mean():.0f} over the {len(loss)} windows named, with nothing fitted."
+
+
+def _mean(loss: np.ndarray) -> str:
+    ends = np.isfinite(loss)
+    lost = f" ({int((~ends).sum())} of {len(loss)} windows diverged)" if not ends.all() else ""
+    return f"{loss[ends].mean():.0f}{lost}" if ends.any() else f"none{lost}"
 
 
 def _sentence(where: str, before: np.ndarray, after: np.ndarray) -> str:

@@ -56,6 +56,13 @@ def describe(
     meaning: Callable[[str], str],
 ) -> list[str]:
     """Sentences for a report: correlated, undetermined and limited parameters."""
+    return [*separated(found, names, spread, meaning), *doubts(found, names, spread, bounds)]
+
+
+def separated(
+    found: Identified, names: Sequence[str], spread: np.ndarray, meaning: Callable[[str], str]
+) -> list[str]:
+    """Sentences on correlated and on undetermined parameters."""
     sentences = []
     for i, j, value in correlated_pairs(found)[:MOST_PAIRS]:
         sentences.append(
@@ -70,12 +77,22 @@ def describe(
         sentences.append(
             f"These data say nothing about {', '.join(quiet)}: they stand where they started."
         )
+    return sentences
+
+
+def doubts(
+    found: Identified,
+    names: Sequence[str],
+    spread: np.ndarray,
+    bounds: tuple[np.ndarray, np.ndarray],
+) -> list[str]:
+    """Sentences on what may be wrong: parameters at their limits, a fit that did not converge."""
     low, high = bounds
     room = 1e-3 * spread
     stuck = found.free & ((found.values < low + room) | (found.values > high - room))
     limited = {names[int(i)]: float(found.values[i]) for i in np.flatnonzero(stuck)}
     vanished = {names[int(i)] for i in np.flatnonzero(stuck & (found.values < low + room))}
-    sentences += at_limits(limited, vanished, names)
+    sentences = at_limits(limited, vanished, names)
     if not found.converged:
         sentences.append(f"The identification did not converge: {found.message}.")
     return sentences

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,10 +19,12 @@ from shiplog.models.extended import Extended
 from shiplog.models.mmg import MMG
 from shiplog.models.network_shape import Shape
 from shiplog.models.starting_values import Start
+from shiplog.nomenclature.contract import CONTRACT
 from shiplog.simulation import force_breakdown, prediction_interval
 from shiplog.simulation.extended_simulator import ExtendedSimulator, Extension, campaign
 from shiplog.simulation.sensitivities import Simulator
-from shiplog.training.runs import extension_file, run_folder
+from shiplog.training.runs import coefficients, extension_file, run_folder
+from shiplog.training.runs.coefficients import Coefficient
 from shiplog.training.runs.run_folder import RunFolder
 from shiplog.training.settings import run_files
 from shiplog.voyages.rows.recording import Record
@@ -44,7 +46,7 @@ class Base(NamedTuple):
     values: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Run(RunFolder, ABC):
     """A run folder whose models can be built.
 
@@ -53,6 +55,46 @@ class Run(RunFolder, ABC):
     """
 
     extension: Extension | None = None
+
+    def __repr__(self) -> str:
+        return f"Run({str(self.path)!r}: {self.label}; {self._fitted(most=3)})"
+
+    @property
+    def text(self) -> str:
+        """What it is, of which ship, fitted to what."""
+        return f"{self.label} in {self.path}, of {self.profile.ship.name}; {self._fitted()}."
+
+    def _fitted(self, most: int = 12) -> str:
+        fitted = self.fitted_to and not (self.given and self.extension is None)
+        return f"fitted to {listed(self.fitted_to, most)}" if fitted else "fitted to no voyage"
+
+    @property
+    def json(self) -> dict:
+        """Its facts and coefficients."""
+        return {
+            "contract": CONTRACT,
+            "run": str(self.path),
+            "label": self.label,
+            "ship": self.profile.ship.name,
+            "fitted_to": list(self.fitted_to),
+            "coefficients": {name: asdict(one) for name, one in self.coefficients.items()},
+        }
+
+    def __str__(self) -> str:
+        return self.text
+
+    @property
+    def coefficients(self) -> dict[str, Coefficient]:
+        """Name → value, unit and 90 % interval, of the first seed: `run.coefficients["hull.y_v"]`,
+        and of an extended run also `run.coefficients["current.speed"]`. Of a network only what its
+        extension has. Raises RunError."""
+        known = self.identified(self.config.seeds[0]) if self.kind.family is PHYSICS else None
+        return coefficients.of(known, self.extension)
+
+    @property
+    def coefficients_frame(self) -> pl.DataFrame:
+        """The same, one row each: name, value, unit, low, high, standard_error, start, free, ..."""
+        return coefficients.frame(self.coefficients)
 
     @property
     def label(self) -> str:
@@ -143,7 +185,7 @@ class Run(RunFolder, ABC):
     def _with_coefficients(self, plain: Base, coefficients: np.ndarray) -> Base: ...
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class NetworkRun(Run):
     """A network has no coefficients. Causes are tested on the ship's MMG in its stead, and
     are added to it. Torch is loaded where the network itself is asked for."""
@@ -206,7 +248,7 @@ class NetworkRun(Run):
         return plain._replace(model=plain.model.bend(coefficients))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PhysicalRun(Run):
     """A model of named coefficients, on which causes are tested directly."""
 

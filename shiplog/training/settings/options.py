@@ -5,11 +5,11 @@ from __future__ import annotations
 import logging
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from shiplog.exceptions import UsageError, listed, nearest
 from shiplog.models import FORCES, MODELS, PHYSICS, taking
-from shiplog.nomenclature.channels import LEAST_WINDOW
+from shiplog.nomenclature.channels import AUTO_WINDOW, LEAST_WINDOW
 from shiplog.training.settings.run_config import DEVICES, RECIPES, WIND_INPUTS, Config
 from shiplog.voyages.windows.augmentation import AUGMENTATIONS
 from shiplog.voyages.windows.split_settings import Split
@@ -26,7 +26,7 @@ class TrainOptions:
     voyages      names or shell patterns of the voyages to learn from; all where there are none
     validation   those to validate on
     seeds        how many; they are numbered from 0
-    window       length of a window [s]: samples at 1 Hz
+    window       length of a window [s]: samples at 1 Hz; or auto, which follows the ship (L/U)
     unchecked    although the profile still says CHECK, or sensors contradict each other
 
     Of networks:
@@ -49,7 +49,7 @@ class TrainOptions:
     voyages: tuple[str, ...] = ()
     validation: tuple[str, ...] = ()
     seeds: int = 1
-    window: int = 100
+    window: int | Literal["auto"] = 100
     unchecked: bool = False
     recipe: str = "fast"
     width: int = 256
@@ -119,7 +119,7 @@ class TrainOptions:
             value = getattr(self, name)
             if value is not None and value < least:
                 raise UsageError(f"--{name} {value} is too small.", hint=f"give {least} or more.")
-        if self.window < LEAST_WINDOW:
+        if self.window != AUTO_WINDOW and self.window < LEAST_WINDOW:
             raise UsageError(
                 f"A window of {self.window} s is too short to compare velocities in.",
                 hint=f"choose --window {LEAST_WINDOW} or longer.",

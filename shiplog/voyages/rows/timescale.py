@@ -15,6 +15,7 @@ NODE_STEP = 2.0  # s between nodes of the acceleration
 STEP_ROWS = 2  # rows of the record to a step of an integration
 SEGMENT_BINS = 15  # of a segment, whatever it lasts
 SHIP_TIME = 7.1  # s, L/U for which the above are made: 5 to 10 s, of 3 m at 0.3 to 0.6 m/s
+WORKING = 0.95  # quantile of the speed: a ship that waits at a berth is no slower for it
 BIN_LENGTHS = (1.4, 2.0, 4.0, 8.0, 16.0)  # s; segments of 21 to 240 s, rows to a bin are even
 CAMPAIGN_SEGMENTS = (
     48  # segments of the shorter campaign, fewer of which say too little of how parts differ

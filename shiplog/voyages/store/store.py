@@ -29,23 +29,20 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import polars as pl
-from filelock import FileLock, Timeout
-from pydantic import ValidationError
-
-from shiplog.exceptions import StoreError, listed, nearest
+from shiplog.exceptions import StoreError, VoyageMissing, listed, nearest
 from shiplog.logs.health.health_report import VoyageReport
 from shiplog.machine import files
 from shiplog.nomenclature.contract import CONTRACT
-from shiplog.ship_profile.differences import differences, readings
-from shiplog.ship_profile.file import advice
-from shiplog.ship_profile.profile import Profile
-from shiplog.voyages.rows import noise_estimate, one_hertz
+from shiplog.nomenclature.numbers import counted
 from shiplog.voyages.store import catalogue, parts
 from shiplog.voyages.store.catalogue import NEW, OLD, CatalogueEntry
+from shiplog.voyages.store.voyage import Voyage
 
-if TYPE_CHECKING:  # with it come scipy and the readers of logs, in half a second
-    from shiplog.voyages.ingest.ingest import Voyage
+if TYPE_CHECKING:
+    import polars as pl
+
+    from shiplog.ship_profile.profile import Profile
+    from shiplog.voyages.ingest.ingest import Voyage as IngestedVoyage
 
 CORRECTED = ("kind", "channel", "value", "low", "high", "unit")
 INGEST_VERSION = 12  # raised when the same log would become another table or report
@@ -53,12 +50,56 @@ SILENT_WAIT_S = 2.0  # how long one waits for another process without a word
 
 log = logging.getLogger(__name__)
 
+# What is heavy is imported where rows, profiles or the lock are asked for: whoever only lists a
+# store waits for none of it.
+
 
 class Store:
-    """A folder of voyages."""
+    """A folder of voyages.
+
+        for voyage in store: print(voyage.name, voyage.seconds)
+        store["voyage_6"].rows_1hz
+
+    `len(store)` counts them, and `"voyage_6" in store` is whether that voyage is there, or that
+    part of one.
+    """
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
+
+    def __repr__(self) -> str:
+        try:
+            names = [entry.name for entry in self.entries()]
+        except StoreError:  # whoever looks at it in a debugger wants no error
+            return f"Store({str(self.path)!r})"
+        return (
+            f"Store({str(self.path)!r}: {counted(len(names), 'voyage')}, {listed(names, most=6)})"
+        )
+
+    def __len__(self) -> int:
+        return len(self.entries())
+
+    def __bool__(self) -> bool:
+        return True  # a store of no voyage is a store
+
+    def __iter__(self) -> Iterator[Voyage]:
+        return (Voyage(self, entry) for entry in self.entries())
+
+    def __contains__(self, name: object) -> bool:
+        try:
+            return isinstance(name, str) and self[name].name == name
+        except StoreError:
+            return False
+
+    def __getitem__(self, name: str) -> Voyage:
+        """A voyage, or a part of one such as `trip[0:1200]`, by its name. Raises VoyageMissing."""
+        entries = {entry.name: entry for entry in self.entries()}
+        part = None if name in entries else parts.parse(str(name))
+        whole = name if part is None else part.whole
+        if whole not in entries:
+            raise VoyageMissing(name, entries, str(self.path))
+        _refuse_beyond(name, {key: entry.seconds for key, entry in entries.items()})
+        return Voyage(self, entries[whole], part)
 
     def entries(self) -> list[CatalogueEntry]:
         """All voyages, by name."""
@@ -97,12 +138,14 @@ class Store:
         known = {entry.name for entry in self.entries()} if stored is None else set(stored)
         return [n for n in names if n in known or ((p := parts.parse(n)) and p.whole in known)]
 
-    def add(self, voyage: Voyage) -> str:
+    def add(self, voyage: IngestedVoyage) -> str:
         """Take a voyage: "added", "unchanged" or "replaced" (same log, otherwise ingested).
 
         Raises StoreError where the name is taken by another log, or the store cannot be written;
         it is then as it was.
         """
+        import polars as pl
+
         place = catalogue.place(self.path, voyage.name)
         try:
             self.path.mkdir(parents=True, exist_ok=True)
@@ -117,7 +160,9 @@ class Store:
                 "store is as it was.",
             ) from error
 
-    def _add(self, voyage: Voyage, place: Path) -> str:
+    def _add(self, voyage: IngestedVoyage, place: Path) -> str:
+        import polars as pl
+
         asked = voyage.corrected is not None
         made = voyage.contents.source is not None
         fingerprint = fingerprint_of(voyage.contents.sha256, voyage.profile, asked, made)
@@ -170,6 +215,8 @@ class Store:
         """
         if not catalogue.unfinished(self.path):
             return
+        from filelock import Timeout
+
         try:
             with self._writing(wait):
                 pass
@@ -197,6 +244,13 @@ class Store:
     def profile(self, names: Iterable[str]) -> Profile:
         """The profile the voyages were read through. Raises StoreError for two ships, and for two
         profiles of one that differ in sizes, places or kinds of sensors."""
+        from pydantic import ValidationError
+
+        from shiplog.ship_profile.differences import differences, readings
+        from shiplog.ship_profile.file import advice
+        from shiplog.ship_profile.profile import Profile
+        from shiplog.voyages.rows import noise_estimate
+
         chosen: Profile | None = None
         first, instruments = "", []
         for name in names:
@@ -247,13 +301,19 @@ class Store:
 
     def voyages(self) -> pl.DataFrame:
         """One row a voyage: name, start, length, usable seconds and windows, findings, source."""
+        import polars as pl
+
         return pl.DataFrame([asdict(entry) for entry in self.entries()])
 
     def seconds(self, names: Sequence[str], profile: Profile) -> pl.DataFrame:
         """The sorted 1 Hz table of these voyages."""
+        from shiplog.voyages.rows import one_hertz
+
         return one_hertz.resample(self.tables(names), profile.columns, profile.circular)
 
     def _table(self, name: str) -> pl.LazyFrame:
+        import polars as pl
+
         part = self.part_of(name)
         if part is not None:
             elapsed = (pl.col("time") - pl.col("time").min()).dt.total_nanoseconds() * 1e-9
@@ -289,6 +349,8 @@ class Store:
         Raises OSError where the store cannot be written; Timeout where another process writes and
         this one does not wait.
         """
+        from filelock import FileLock, Timeout
+
         lock = FileLock(self.path / ".lock")
         try:
             lock.acquire(timeout=SILENT_WAIT_S if wait else 0.0)
@@ -346,6 +408,8 @@ def _sound(folder: Path) -> Path | None:
 
 def _whole(folder: Path, facts: dict) -> bool:
     """Whether the table has the rows that were written: a disk may have lost them since."""
+    import polars as pl
+
     try:
         rows = pl.scan_parquet(folder / "table.parquet", hive_partitioning=False)
         return rows.select(pl.len()).collect().item() == facts["report"]["rows"]
@@ -353,7 +417,7 @@ def _whole(folder: Path, facts: dict) -> bool:
         return False
 
 
-def _describe(voyage: Voyage, fingerprint: str) -> dict:
+def _describe(voyage: IngestedVoyage, fingerprint: str) -> dict:
     return {
         "contract": CONTRACT,
         "fingerprint": fingerprint,

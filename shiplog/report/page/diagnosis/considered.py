@@ -43,8 +43,9 @@ def table(verdict: Mapping[str, Any]) -> list[tuple[str, str, Line]]:
     rows = []
     for label in every:
         bare = label.partition(":")[0]
-        if label not in named and any(known.startswith(f"{label}:") for known in every):
-            continue  # a cause of several units or channels stands there once for each
+        units = [one for one in every if one.startswith(f"{label}:") and one not in labels]
+        if label not in named and units:
+            continue  # a cause of several units stands there once for each
         state, why = _state(label, bare, named, traces, limits, rejected, untestable)
         rows.append((spoken(label), state, why))
     return rows

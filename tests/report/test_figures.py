@@ -1,0 +1,158 @@
+"""Pictures of a diagnosis: their tables by hand, and what is drawn of them."""
+
+import math
+
+import numpy as np
+import page_content
+import polars as pl
+import pytest
+
+from shiplog.report.figures import chart, errors, forces, hull, pictures, style, timeline, windows
+from shiplog.report.figures import picture_data as data_files
+from shiplog.report.figures.content import Content
+from shiplog.report.figures.picture_data import AFTER, BEFORE, MEASURED
+
+
+@pytest.fixture(scope="module")
+def content():
+    return Content(page_content.verdict(), page_content.pictures())
+
+
+def test_position_error_is_the_drift_times_the_time(content):
+    table = errors.table(content, errors.POSITION)
+    last = {r["model"]: r for r in table.filter(pl.col("elapsed") == 99.0).to_dicts()}
+    assert last[BEFORE]["median"] == pytest.approx(9.9)
+    assert last[AFTER]["median"] == pytest.approx(0.99)
+
+
+def test_heading_error_is_the_short_way_round():
+    data = page_content.pictures()
+    turned = pl.when(pl.col("model") == BEFORE).then(math.radians(350.0)).otherwise(0.0)
+    data = data_files.replace(data, tracks=data.tracks.with_columns(heading=turned))
+    table = errors.table(Content(page_content.verdict(), data), errors.HEADING)
+    assert table.filter(pl.col("model") == BEFORE)["median"].to_list() == pytest.approx(
+        [10.0] * 100
+    )
+
+
+def test_words_say_the_numbers_of_the_picture(content):
+    words = chart.closeup_words(chart.closeup_table(content), content)
+    assert "mmg is 9.9 m (2.0 ship lengths)" in words
+    assert "mmg, with it is 1.0 m (0.2 ship lengths)" in words
+    assert "mean 800 of mmg, 200 of mmg, with it" in windows.words(windows.table(content), content)
+    force = forces.words(forces.table(content, "sway"), content, "sway")
+    assert "root mean square 3 N" in force and "Without the force of current: 1 N" in force
+
+
+def test_the_closeup_is_the_window_whose_error_fell_most():
+    data = page_content.pictures(windows=3)
+    fell = pl.when((pl.col("model") == BEFORE) & (pl.col("window") == 1)).then(900.0)
+    data = data_files.replace(data, errors=data.errors.with_columns(loss=fell.otherwise("loss")))
+    assert chart.closeup_window(data) == (page_content.HOSTILE, 1)
+
+
+def test_a_hull_that_heads_east_lies_along_east():
+    shape = hull.outline(10.0, 2.0)
+    east = hull.placed(shape, np.array([0.0]), np.array([0.0]), np.array([math.pi / 2]))[0]
+    assert np.ptp(east[:, 0]) == pytest.approx(10.0)  # east
+    assert np.ptp(east[:, 1]) == pytest.approx(2.0)  # north
+    assert east[0] == pytest.approx((5.0, 0.0))  # the bow
+
+
+@pytest.mark.parametrize("latitude", [34.8, -34.8, None])
+def test_a_chart_has_coordinates_where_the_log_has_them(latitude):
+    data = page_content.pictures(latitude=latitude)
+    made = pictures.figure("track", Content(page_content.verdict(), data))
+    made.draw_without_rendering()
+    ticks = [t.get_text() for t in made.axes[0].get_yticklabels()]
+    if latitude is None:
+        assert made.axes[0].get_ylabel() == "x₀ [m], north"
+    else:
+        # 34.8 deg are 34°48'; a minute of latitude is 1855 m, so 100 m are 0.05'
+        assert any(t.startswith("34°48.0") or t.startswith("34°47.9") for t in ticks)
+        assert {t[-1] for t in ticks} == {"N" if latitude > 0 else "S"}
+
+
+def test_arrows_blow_and_set_where_they_should(content):
+    """Wind from the east blows to the west; the current sets to the south."""
+    made = pictures.figure("track", content)
+    arrows = [t for t in made.axes[0].texts if getattr(t, "arrow_patch", None) is not None]
+    heads = [tuple(np.sign(np.round(-np.array(t.xyann), 6))) for t in arrows]
+    assert heads == [(0.0, 1.0), (-1.0, -0.0), (0.0, -1.0)]  # north, wind, current
+
+
+def test_stretches_of_the_whole_voyage_are_not_drawn():
+    whole = {"voyage": page_content.HOSTILE, "start_s": 0.0, "end_s": 100.0, "kind": "held"}
+    verdict = page_content.verdict()
+    verdict["intervals"] = [*verdict["intervals"], whole]
+    table = timeline.table(Content(verdict, page_content.pictures()))
+    assert table["kind"].to_list() == ["sailed", "external"]
+
+
+def test_thinning_keeps_every_extreme():
+    rng = np.random.default_rng(0)
+    time, value = np.arange(100_000.0), rng.normal(size=100_000)
+    value[51_234], value[77_777] = 50.0, -40.0
+    value[10_000:10_050] = np.nan
+    thin_time, thin = style.thinned(time, value)
+    assert len(thin_time) < 2000
+    assert np.nanmax(thin) == 50.0 and np.nanmin(thin) == -40.0
+    assert thin_time[np.nanargmax(thin)] == 51_234
+    assert np.isnan(thin).any() and (np.diff(thin_time) > 0).all()
+
+
+def test_a_hundred_thousand_seconds_stay_small():
+    data = page_content.pictures(("long",), 1000)
+    content = Content(page_content.verdict(voyages=("long",)), data)
+    size = sum(len(style.svg(pictures.figure(name, content), name)) for name in pictures.PICTURES)
+    assert size < 1e6
+
+
+def test_ids_of_two_pictures_differ(content):
+    one, other = (style.svg(pictures.figure("ranking", content), p) for p in "ab")
+    assert one != other and one.replace("a-", "-") == other.replace("b-", "-")
+    assert page_content.HOSTILE not in style.svg(pictures.figure("stretches", content), "s")
+
+
+def test_files_of_every_picture(content, tmp_path):
+    made = pictures.save(content, tmp_path)
+    assert {p.suffix for p in made} == {".svg", ".pdf", ".png", ".parquet", ".csv", ".tex"}
+    assert all(p.stat().st_size > 50 for p in made)
+    table = pl.read_parquet(tmp_path / "ranking.parquet")
+    assert table.rows() == [("current", 0.97), ("outside the catalogue (motion)", 0.03)]
+    latex = (tmp_path / "stretches.tex").read_text(encoding="utf-8")
+    assert r"\textbf{x}" not in latex and r"\textbackslash" in latex and r"\&" in latex
+    assert pl.read_csv(tmp_path / "parameters.csv").rows() == [
+        ("current", "speed", 0.1, 0.09, 0.11, "m/s")
+    ]
+
+
+def test_what_was_saved_is_read_again(tmp_path):
+    data = page_content.pictures()
+    data_files.save(data, tmp_path / "p")
+    again = data_files.load(tmp_path / "p")
+    for name in data_files.SCHEMAS:
+        assert getattr(again, name).equals(getattr(data, name)), name
+    assert again.models == dict(data.models) and again.current == data.current
+
+
+def test_a_picture_on_given_axes(content):
+    from matplotlib.figure import Figure
+
+    own = Figure()
+    axes = own.add_subplot()
+    assert pictures.figure("position_error", content, ax=axes) is own
+    assert len(axes.lines) == 2
+
+
+def test_the_same_model_has_the_same_colour_in_every_picture(content):
+    from matplotlib.colors import to_hex
+
+    label, colour = next((lab, c) for key, lab, c in chart.legend(content.data) if key == AFTER)
+    seen = set()
+    for name in ("closeup", "position_error", "windows"):
+        axes = pictures.figure(name, content).axes[0]
+        lines = [one for one in axes.get_lines() if one.get_label() == label]
+        seen |= {to_hex(one.get_color()) for one in lines}
+    assert seen == {colour}
+    assert {key for key, *_ in chart.legend(content.data)} == {MEASURED, BEFORE, AFTER}
