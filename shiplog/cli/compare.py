@@ -29,7 +29,19 @@ def compare(
     voyages: TestVoyages = None,
     store: StoreOption = STORE,
     save: Annotated[
-        Path | None, typer.Option(help="Write the recording here and open nothing.")
+        Path | None,
+        typer.Option(
+            metavar="FILE.rrd|png|svg|html",
+            help="Write the recording, a picture or the page here and open nothing.",
+        ),
+    ] = None,
+    at: Annotated[
+        str | None,
+        typer.Option(
+            metavar="VOYAGE:SECONDS",
+            help="Open it at this moment: that voyage in front, the charts about it. Without "
+            "--voyages, only that voyage is compared.",
+        ),
     ] = None,
     web: Annotated[
         bool,
@@ -46,6 +58,7 @@ def compare(
     Example: shiplog compare runs/ref runs/d-ref --save compare.rrd
     """
     from shiplog.machine.paths import check_file
+    from shiplog.report.viewer import saving
 
     if web and save is not None:
         raise UsageError(
@@ -55,18 +68,19 @@ def compare(
     check_runs(runs, store, voyages, cause)
     page = page_file(report)
     to = check_file(save or runs[0] / "compare.rrd", "--save")
+    saving.check(to)
     from shiplog.commands.bars import loading
 
     with loading():
         from shiplog.commands.evaluate import compare_runs, keep_pages
     from shiplog.voyages.store.store import Store
 
-    result = compare_runs(runs, Store(store), voyages or [], to, cause or [])
+    result = compare_runs(runs, Store(store), voyages or [], to, cause or [], at)
     answer(result, json_to)
     lost = [*result.lost, *keep_pages(result.evaluation, Store(store), page)]
     if save is None and result.recording is not None:
         try:
-            show(result.recording, web)
+            show(result.recording, web, result.moment and result.moment.seconds)
         except ShiplogError as error:
             lost.append(error)
     leave_lost(lost)

@@ -84,12 +84,13 @@ def leave_lost(lost: Sequence[ShiplogError]) -> None:
         raise typer.Exit(LOST)
 
 
-def show(recording: Path, web: bool) -> None:
+def show(recording: Path, web: bool, time_s: float | None = None) -> None:
+    """In a window, or a browser; with the cursor at that second."""
     from shiplog.report import viewer
 
     if not web:
-        viewer.open_viewer(recording)
+        viewer.open_viewer(recording, time_s)
         return
-    with viewer.serve(recording) as served:
+    with viewer.serve(recording, time_s=time_s) as served:
         typer.echo(f"open {served.address} in a browser; Ctrl-C ends it", err=True)
         served.wait()

@@ -226,14 +226,15 @@ def compare(
     *,
     save: str | Path | None = None,
     causes: Files = (),
+    at: str | None = None,
 ) -> Comparison:
-    """The same as a Rerun recording: `save`, or compare.rrd in the first run. Raises
-    ShiplogError."""
+    """The same as a Rerun recording: `save`, or compare.rrd in the first run. `save` may also be
+    a .png, .svg or .html. `at`: "VOYAGE:SECONDS" that it is opened at. Raises ShiplogError."""
     from shiplog.commands import evaluate as evaluating
 
     to = None if save is None else Path(save)
     done = evaluating.compare_runs(
-        _runs(runs), Store(_path(store)), _names(voyages), to, _files(causes)
+        _runs(runs), Store(_path(store)), _names(voyages), to, _files(causes), at
     )
     done.written()
     return done

@@ -111,7 +111,8 @@ def diagnose_run(
     about = subject.of(run, done.verdict.made, profile, seconds.voyages)
     done = replace(done, verdict=replace(done.verdict, subject=about))
     _save(done, hashes, began, {"run_path": run_path, "store_path": store.path})
-    done = _drawn(done, run, seconds)
+    datums = {name: found for name in names if (found := store.origin(name)[1]) is not None}
+    done = _drawn(replace(done, datums=datums), run, seconds)
     if extend is None:
         return done
     if done.after is None:

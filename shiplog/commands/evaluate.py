@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,7 +23,14 @@ from shiplog.report.page import html
 from shiplog.report.page.evaluation import page as evaluation_page
 from shiplog.report.page.evaluation import source as sources
 from shiplog.report.result import Shown, Shows
-from shiplog.report.viewer.comparison_data import BAND, ComparisonData, DrawnActuator
+from shiplog.report.viewer import saving
+from shiplog.report.viewer.comparison_data import (
+    BAND,
+    ComparisonData,
+    Current,
+    DrawnActuator,
+    Moment,
+)
 from shiplog.simulation import baselines, prediction_interval, scoring
 from shiplog.simulation import coverage as covering
 from shiplog.training.runs import load_model
@@ -34,11 +42,13 @@ from shiplog.training.runs.run_checks import (
     refuse_other_window,
 )
 from shiplog.training.runs.voyages_to_test import held_back, say_twins
-from shiplog.voyages.store import contradicted
+from shiplog.voyages.store import contradicted, moments
 from shiplog.voyages.store.store import Store
 from shiplog.voyages.windows import ship_time, windows
 from shiplog.voyages.windows.split import plan
 from shiplog.voyages.windows.windows import Windows
+
+WINDOWS_SHOWN = 2.0  # windows about a moment: one before it and one after
 
 # seconds of the sample logs' test voyage
 STAGES = {"reading": 1.0, "simulating": 3.0, "coverage": 1.0, "forces": 1.0}
@@ -101,6 +111,7 @@ def evaluate_runs(
         inside=_inside(scored, bands, cut),
         forces=_forces(opened, rows),
         contradicted=contradicted.list_contradicted(store, names),
+        datums={name: found for name in names if (found := store.origin(name)[1]) is not None},
         ship_time=ship_time.of(first.profile.ship.length_m, first.training()),
     )
     return replace(found, shown=_shown(found, store))
@@ -131,6 +142,14 @@ def save(evaluation: Evaluation) -> tuple[ShiplogError, ...]:
     return tuple(refused)
 
 
+def _write_page(evaluation: Evaluation, store: Store, path: Path) -> None:
+    from shiplog.report.page import html
+    from shiplog.report.page.evaluation import page as evaluation_page
+    from shiplog.report.page.evaluation import source as sources
+
+    html.write(evaluation_page.of_source(sources.of_evaluation(evaluation, store)), path)
+
+
 def keep_pages(evaluation: Evaluation, store: Store, page: Path | None) -> tuple[ShiplogError, ...]:
     """What `shiplog report RUN` makes its page of, in the folder of a run that was evaluated alone;
     and the page, where one is asked for. Returns what could not be written."""
@@ -149,8 +168,8 @@ def keep_pages(evaluation: Evaluation, store: Store, page: Path | None) -> tuple
     return tuple(refused)
 
 
-def comparison(evaluation: Evaluation, title: str) -> ComparisonData:
-    """What the viewer shows of an evaluation."""
+def comparison(evaluation: Evaluation, title: str, moment: Moment | None = None) -> ComparisonData:
+    """What the viewer shows of an evaluation, opened at that moment."""
     run = evaluation.runs[0]
     labels = {r.name: f"{r.name} ({r.config.legend})" for r in evaluation.runs}
     profile = run.profile
@@ -169,6 +188,10 @@ def comparison(evaluation: Evaluation, title: str) -> ComparisonData:
         ).drop("run"),
         training=run.training().select(profile.columns),
         summary=evaluation.text,
+        extended=tuple(labels[r.name] for r in evaluation.runs if r.extension is not None),
+        datums=evaluation.datums,
+        current=_named_current(evaluation.runs),
+        moment=moment,
         banks=profile.site.banks,
         trained=run.name if len(evaluation.runs) > 1 else "",
         forces=None
@@ -181,15 +204,23 @@ def comparison(evaluation: Evaluation, title: str) -> ComparisonData:
 
 @dataclass(frozen=True, repr=False)
 class Comparison(Shows):
-    """`recording` is a Rerun file of measured and simulated voyages, `evaluation` what it shows.
+    """`saved` is a Rerun file, or a picture, of measured and simulated voyages, `evaluation` what
+    it shows.
 
-    lost   what could not be written, and why. Without the recording, `recording` is None and all
-           else is there
+    lost     what could not be written, and why. Without the file, `saved` is None and all else is
+             there
+    moment   what it is opened at
     """
 
     evaluation: Evaluation
-    recording: Path | None
+    saved: Path | None
     lost: tuple[ShiplogError, ...] = ()
+    moment: Moment | None = None
+
+    @property
+    def recording(self) -> Path | None:
+        """The Rerun file; None where a picture was asked for, or it could not be written."""
+        return self.saved if self.saved is None or self.saved.suffix.lower() == ".rrd" else None
 
     @property
     def shown(self) -> Shown | None:  # type: ignore[override]  # of the evaluation
@@ -202,20 +233,24 @@ class Comparison(Shows):
 
     @property
     def lines(self) -> list[str]:
-        return [*self.evaluation.lines, "", f"Recording: {self.recording or 'none'}"]
+        what = "Recording" if self.saved is None else saving.NAMES[self.saved.suffix.lower()]
+        return [*self.evaluation.lines, "", f"{what}: {self.saved or 'none'}"]
 
     @property
     def json(self) -> dict:
         found = self.evaluation
         where = None if self.recording is None else str(self.recording)
         answers = {run.name: found.answer(run) for run in found.runs}
-        return {"contract": CONTRACT, "recording": where, "runs": answers}
+        answer = {"contract": CONTRACT, "recording": where, "runs": answers}
+        if self.saved is not None and self.recording is None:
+            answer["saved"] = str(self.saved)
+        return answer
 
     def written(self) -> Path:
-        """The recording. Raises ShiplogError where it could not be written."""
-        if self.recording is None:
+        """The file. Raises ShiplogError where it could not be written."""
+        if self.saved is None:
             raise self.lost[-1]
-        return self.recording
+        return self.saved
 
 
 @staged("comparing", STAGES | {"recording": 2.0})
@@ -225,21 +260,44 @@ def compare_runs(
     voyages: Sequence[str],
     save_to: Path | None,
     cause_files: Sequence[Path] = (),
+    at: str | None = None,
 ) -> Comparison:
     """Evaluate the runs on the same windows and record both sides; in the first run's folder
-    unless a path is given."""
-    from shiplog.report import viewer
+    unless a path is given, whose ending says what is written.
 
+    at   VOYAGE:SECONDS that it is opened at; without `voyages`, that voyage alone is compared
+    """
+    if save_to is not None:
+        saving.check(save_to)
+    moment = None if at is None else moments.parse(at)
+    if moment is not None:
+        moments.check(store, *moment)
+        voyages = moments.among(store, moment[0], voyages)
     found = evaluate_runs(paths, store, voyages, cause_files)
+    opened = None
+    if moment is not None:
+        opened = Moment(*moment, WINDOWS_SHOWN * found.runs[0].config.window)
     reach("recording")
     lost = save(found)
-    recording = save_to or found.runs[0].path / "compare.rrd"
+    saved: Path | None = save_to or found.runs[0].path / "compare.rrd"
     title = f"{found.runs[0].profile.ship.name}: {listed(found.voyages, most=3)}"
     try:
-        viewer.save(comparison(found, title), recording)
+        if saved.suffix.lower() == saving.PAGE:
+            _write_page(found, store, saved)
+        else:
+            saving.write(comparison(found, title, opened), saved)
     except ShiplogError as error:
-        recording, lost = None, (*lost, error)
-    return Comparison(found, recording, lost)
+        saved, lost = None, (*lost, error)
+    return Comparison(found, saved, lost, opened)
+
+
+def _named_current(runs: Sequence[Run]) -> Current | None:
+    """Of the first run that a diagnosis extended by one."""
+    for run in runs:
+        if (water := run.extension_numbers().get("current")) is not None:
+            north, east = (float(one) for one in water)
+            return Current(math.hypot(north, east), math.atan2(east, north))
+    return None
 
 
 def _numbered(cut: Windows) -> pl.DataFrame:

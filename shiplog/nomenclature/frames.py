@@ -45,6 +45,12 @@ def local_plane(
     return np.stack((north, east), axis=-1)
 
 
+def geodetic(north: float, east: float, datum: tuple[float, float]) -> tuple[float, float]:
+    """Latitude and longitude [deg] of a place in the plane of `local_plane`: its inverse."""
+    latitude, longitude, _ = pymap3d.ned2geodetic(north, east, 0.0, datum[0], datum[1], 0.0)
+    return float(latitude), float(longitude)
+
+
 def earth_velocity(speed: np.ndarray, course: np.ndarray) -> np.ndarray:
     """Speed [m/s] and course over ground [rad, clockwise from north] to (north, east) [n, 2].
 

@@ -24,25 +24,26 @@ MEASURED: Colour = (25, 25, 25, 255)
 MODELS: tuple[Colour, ...] = (BLUE, GREEN, PURPLE, ORANGE, SKY, (94, 60, 153, 255))
 EXTENDED: Colour = VERMILLION  # the model that a diagnosis extended, and no other
 NAMED_FORCE: Colour = EXTENDED  # what the extended model has and the one before has not
-WIND: Colour = (136, 34, 85, 255)  # arrows and forces; of Tol's colours (2021), as CURRENT
-CURRENT: Colour = (51, 34, 136, 255)
+WIND: Colour = (170, 68, 120, 255)  # arrows and forces
+CURRENT: Colour = (100, 90, 210, 255)
 BANK: Colour = (140, 110, 70, 255)
 GRID: Colour = (222, 226, 230, 255)
 ZERO: Colour = (190, 196, 202, 255)
 TEXT: Colour = (30, 30, 30, 255)
 TRAINING: Colour = (150, 160, 175, 255)  # what a model was trained on, beside the trial
 TRIAL: Colour = (90, 90, 90, 255)
-# Measured, so dark as all that is: no hue of a model, which would look like that model's.
+# No hue of a model, which would look like that model's. Legends lie on a dark ground or on a light
+# one, as the reader's viewer is set: each of these has a contrast of 3 with either.
 ACTUATORS: tuple[Colour, ...] = (
-    (110, 80, 45, 255), (70, 92, 120, 255), (25, 25, 25, 255), (150, 140, 130, 255),
-    (120, 45, 45, 255), (75, 95, 60, 255), (105, 75, 115, 255), (150, 115, 60, 255),
+    (150, 105, 55, 255), (85, 115, 155, 255), (120, 120, 120, 255), (165, 90, 90, 255),
+    (100, 125, 70, 255), (140, 100, 150, 255), (165, 120, 30, 255), (60, 130, 130, 255),
 )  # fmt: skip
 FORCES: dict[str, Colour] = {  # of each part on the ship; the total is dark
-    "hull": (70, 92, 120, 255), "propeller": (182, 140, 60, 255), "rudder": (110, 80, 45, 255),
-    "wind": WIND, "current": CURRENT, "thruster": (75, 95, 60, 255),
+    "hull": (85, 115, 155, 255), "propeller": (60, 130, 130, 255), "rudder": (150, 105, 55, 255),
+    "wind": WIND, "current": CURRENT, "thruster": (100, 125, 70, 255),
     "network": (120, 120, 120, 255), "total": MEASURED,
 }  # fmt: skip
-OTHER_FORCES: tuple[Colour, ...] = ((105, 75, 115, 255), (160, 120, 110, 255))
+OTHER_FORCES: tuple[Colour, ...] = ((140, 100, 150, 255), (165, 90, 90, 255))
 # Names that the demo and the pages use look different in one picture.
 PREFERRED: dict[str, Colour] = {
     "mmg": BLUE, "ref": GREEN, "d-ref": PURPLE, "feedforward": GREEN, "hybrid": SKY,

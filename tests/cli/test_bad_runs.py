@@ -160,6 +160,16 @@ CASES = {
         *d.on("compare", "mmg"), "--save", d.path("none") / "a.rrd"]),
     "compare: --save a folder": (["it is a folder"], lambda d: [
         *d.on("compare", "mmg"), "--save", d.folder]),
+    "compare: --save as another kind": (["ends in '.docx'", ".rrd, .png, .svg"], lambda d: [
+        *d.on("compare", "mmg"), "--save", d.path("a.docx")]),
+    "compare: --at no moment": (["'trip_3' is no voyage and seconds"], lambda d: [
+        *d.on("compare", "mmg"), "--at", "trip_3"]),
+    "compare: --at no voyage": (["'trip_9', which is not in the store"], lambda d: [
+        *d.on("compare", "mmg"), "--at", "trip_9:3"]),
+    "compare: --at a voyage left out": (["'trip_1', which is not among"], lambda d: [
+        *d.on("compare", "mmg"), "--at", "trip_1:3"]),
+    "compare: --at after the end": (["trip_3:99 is outside", "which is 60 s"], lambda d: [
+        *d.on("compare", "mmg"), "--at", "trip_3:99"]),
     "diagnose: --extend is there": (["exists already", "--extend"], lambda d: [
         *d.on("diagnose", "mmg"), "--extend", d.dir("r")]),
     "diagnose: --extend in a file": (["--extend", "is a file"], lambda d: [

@@ -44,6 +44,31 @@ def test_what_was_measured_and_the_parts_of_the_force_are_in_no_models_colour():
     assert not models & {*others, colours.MEASURED, colours.WIND, colours.CURRENT}
 
 
+def luminance(colour):
+    """Relative luminance, as WCAG 2.2 defines it."""
+    parts = [part / 255.0 for part in colour[:3]]
+    red, green, blue = (p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+def contrast(one, other):
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def test_a_legend_reads_on_a_dark_ground_and_on_a_light_one():
+    """3 is WCAG's least for graphics. Rerun's dark legend is black, its light one white."""
+    assert contrast((0, 0, 0), (255, 255, 255)) == 21.0
+    drawn = [*colours.ACTUATORS, *colours.FORCES.values(), *colours.OTHER_FORCES]
+    for colour in {*drawn, colours.NAMED_FORCE} - {colours.MEASURED}:  # that is named "(black)"
+        assert contrast(colour, (0, 0, 0)) >= 3.0, colour
+        assert contrast(colour, colours.PAPER) >= 3.0, colour
+
+
+def test_words_and_what_was_measured_read_on_paper():
+    assert contrast(colours.TEXT, colours.PAPER) >= 7.0 <= contrast(colours.MEASURED, colours.PAPER)
+
+
 def test_a_colour_in_the_web():
     assert colours.web(colours.BLUE) == "#0072b2"
 

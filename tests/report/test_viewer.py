@@ -29,7 +29,8 @@ def tensor(path, entity, component):
 def test_the_line_of_a_bank_says_what_it_is(saved):
     table = rows(saved, "/track/harbour/banks/labels", "Points2D:labels")
     assert table["Points2D:labels"].to_list() == [["bank"]]
-    assert table["Points2D:positions"].to_list() == [[[15.0, 10.0]]]  # its middle, north up
+    ((place,),) = table["Points2D:positions"].to_list()
+    assert place[0] == 15.0 and 10.0 < place[1] < 11.0  # just below its middle, north up
 
 
 def test_everything_compared_is_an_entity(saved):
@@ -39,7 +40,7 @@ def test_everything_compared_is_an_entity(saved):
         r"/track/open\ sea/simulated/mmg", "/track/harbour/banks", "/state/harbour/surge/measured",
         "/state/harbour/yaw_rate/simulated/mmg", "/actuator/harbour/angle/rudder_port",
         "/actuator/harbour/revolutions/propeller", "/wind/harbour/wind_speed",
-        "/error/harbour/simulated/mmg",
+        "/error/harbour/position/simulated/mmg", "/error/harbour/heading/simulated/mmg",
         "/hist/surge/training", "/hist/surge/test", "/hist/propeller/test", "/hist/wind/training",
         "/hist/wind/test", "/report",
     ):  # fmt: skip
@@ -55,29 +56,34 @@ def test_columns_are_whole_and_in_the_units_their_axes_say(saved):
     )
     assert scalars(saved, "/actuator/harbour/angle/rudder_port")[0] == pytest.approx(-35.0)
     assert scalars(saved, "/wind/harbour/wind_angle")[0] == pytest.approx(310.0)
+
+
+def test_a_heading_is_broken_where_it_passes_north(saved):
+    """6 deg/s for 200 s: it is north at 60, 120 and 180 s, and south one time in between each."""
     heading = scalars(saved, "/state/harbour/heading/measured")
-    assert heading == pytest.approx(6.0 * np.arange(SECONDS))  # 1200 deg, never back to -180
+    breaks = np.flatnonzero(np.isnan(heading))
+    assert len(heading) == SECONDS + 3 == SECONDS + len(breaks)
+    assert np.nanmin(heading) >= 0.0 and np.nanmax(heading) <= 360.0
+    assert np.abs(np.diff(heading))[np.isfinite(np.diff(heading))].max() == pytest.approx(6.0)
+    assert np.delete(heading, breaks)[[0, 30, 59, 61]] == pytest.approx([0.0, 180.0, 354.0, 6.0])
 
 
-def test_windows_start_anew_and_keep_to_the_measured_turn(saved):
+def test_the_seam_lies_where_the_ship_does_not_pass(compared):
+    """About north all the time: a heading of 350 to 10 deg is drawn as -10 to 10, in one line."""
+    rows = compared.measured.with_columns(heading=0.17 * (pl.col("time") * 0.1).sin())
+    drawn = display.drawn(replace(compared, measured=rows))
+    assert timeline.compass_seam(drawn, "harbour") == 180.0
+    south = display.drawn(replace(compared, measured=rows.with_columns(pl.col("heading") + 3.1)))
+    assert timeline.compass_seam(south, "harbour") == 360.0
+
+
+def test_windows_start_anew_and_break_at_the_seam(saved):
     table = rows(saved, "/state/harbour/heading/simulated/mmg", "Scalars:scalars")
     heading = table["Scalars:scalars"].explode().to_numpy()
-    assert len(heading) == 201  # two windows of 100, and the gap between them
-    assert np.isnan(heading[100]) and np.isfinite(np.delete(heading, 100)).all()
-    assert np.delete(heading, 100) == pytest.approx(6.0 * np.arange(200))
+    assert len(heading) == 204  # two windows of 100, the gap between them, and north three times
+    assert np.isnan(heading).sum() == 4
     strips = rows(saved, "/track/harbour/simulated/mmg", "LineStrips2D:strips")
     assert len(strips["LineStrips2D:strips"][0]) == 2
-
-
-def test_the_error_is_logarithmic_and_of_the_median_seed(saved, compared):
-    assert display.drawn_seeds(compared) == {"network fast": 0, "mmg": 0}
-    error = scalars(saved, "/error/harbour/simulated/mmg")
-    assert error[99] == pytest.approx(math.log10(1.0 + 0.99**2))
-    spread = rows(saved, "/error/harbour/seeds/mmg", "Scalars:scalars")["Scalars:scalars"]
-    lowest, highest = spread[99]
-    assert (lowest, highest) == pytest.approx(
-        (math.log10(1.0 + 0.99**2), math.log10(1.0 + 1.98**2))
-    )
 
 
 def test_a_turn_to_starboard_turns_clockwise_on_the_chart():
@@ -101,9 +107,9 @@ def test_a_ship_with_an_outline_of_its_own_is_drawn_with_it(compared):
 def test_a_chart_of_the_sea_is_in_kilometres(compared):
     at_sea = compared.measured.with_columns(pl.col("x0") * 1000.0)
     far, unit = trajectory.in_chart_units(display.drawn(replace(compared, measured=at_sea)))
-    assert unit == "kilometres" and far.ship_length == pytest.approx(0.003)
+    assert unit == "km" and far.ship_length == pytest.approx(0.003)
     assert far.measured["x0"].max() == pytest.approx(compared.measured["x0"].max())
-    assert trajectory.in_chart_units(display.drawn(compared))[1] == "metres"
+    assert trajectory.in_chart_units(display.drawn(compared))[1] == "m"
 
 
 def test_histograms_count_every_row(saved, compared):

@@ -50,7 +50,7 @@ def test_a_model_that_knows_its_doubt_is_drawn_with_its_band(compared, tmp_path)
         r"surge/seeds/network\ fast", "sway/seeds/mmg",  # no columns: as without bands
     ):  # fmt: skip
         assert f"/state/harbour/{without}" in text, without
-    assert r"band/network" not in text and "/error/harbour/seeds/mmg" in text
+    assert r"band/network" not in text and "/error/harbour/position/seeds/mmg" in text
 
 
 def test_without_bands_none_is_drawn(saved, compared):

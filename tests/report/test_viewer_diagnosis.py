@@ -105,6 +105,28 @@ def test_the_window_that_improved_most_comes_first(exhibit):
     assert telling.select("voyage", "window").rows() == [("out", 1), ("home", 1)]  # the worst
 
 
+def test_nothing_is_called_improved_that_is_not(exhibit):
+    """After is larger than before in every window of `out`, and smaller in one at home."""
+    worse = exhibit.errors.with_columns(
+        after=pl.when(pl.col("voyage") == "out").then(pl.col(BEFORE) * 2.0).otherwise(pl.col(AFTER))
+    )
+    shown = replace(exhibit, errors=worse)
+    assert shown.improved == {"home"}
+    tabs = {tab.name: tab for tab in diagnosis.blueprint(diagnosis.pictured(shown))}
+    assert [next(views([tabs[v]]))[0] for v in ("home", "out")] == [
+        "Most improved, 100 to 199 s [m]", "Largest error, 100 to 199 s [m]",
+    ]  # fmt: skip
+
+
+def test_positions_of_a_window_are_off_by_what_the_speed_is(saved):
+    """0.8 m/s instead of 0.5: 0.3 m a second from the window's start, and 0.1 m with the causes."""
+    before = scalars(saved, "/position_errors/out/before")
+    assert np.isnan(before[100]) and len(before) == 201
+    assert before[[0, 10, 99, 101, 200]] == pytest.approx([0.0, 3.0, 29.7, 0.0, 29.7])
+    after = scalars(saved, r"/position_errors/out/with\ current\ and\ heading\ offset")
+    assert after[[0, 10, 99]] == pytest.approx([0.0, 1.0, 9.9])
+
+
 def test_a_window_in_which_the_model_diverges_is_not_the_one_that_improved_most():
     """It is in none of the figures: of three windows the second, whose L is 1e9."""
     size, loss = 5, np.array([[30.0, 0.0, 0.0], [1e9, 0.0, 0.0], [0.0, 20.0, 0.0]])
@@ -172,10 +194,10 @@ def test_each_voyage_has_its_tab_with_units_and_colours_reported(exhibit):
     tabs = diagnosis.blueprint(diagnosis.pictured(exhibit))
     assert [tab.name for tab in tabs] == ["out", "home"]
     assert [name for name, _ in views(tabs[:1])] == [
-        "Most improved, 100 to 199 s [m]: measured black, before blue, "
-        "with current and heading offset orange",
+        "Most improved, 100 to 199 s [m]",
         "Whole voyage", "Report", "surge force [N], positive ahead",
         "sway force [N], positive to starboard", "yaw moment [N m], positive bow to starboard",
+        "position error in each held-out window [m]",
         "velocity error of each held-out window, root mean square [cm/s, or 0.1 deg/s]",
     ]  # fmt: skip
 
@@ -194,7 +216,7 @@ def test_a_verdict_that_names_nothing_shows_what_is_left(exhibit, tmp_path):
     assert "/unexplained/out/surge/lacks" in text and "/named" not in text
     assert r"/errors/out/the\ model" in text and r"/with\ " not in text
     names = [name for name, _ in views(diagnosis.blueprint(diagnosis.pictured(nothing)))]
-    assert names[0] == "Worst, 100 to 199 s [m]: measured black, the model blue"
+    assert names[0] == "Largest error, 100 to 199 s [m]"
     assert names.count("surge force [N], positive ahead") == 1  # nothing is known at home
 
 

@@ -49,7 +49,7 @@ def test_each_part_is_a_line_with_its_force(with_forces, tmp_path):
         assert np.delete(values, 40) == pytest.approx(value)
     text = entities(rrd)
     assert "network" not in text.replace(r"network\ fast", "") and "/force/harbour" not in text
-    for part, colour in (("terms/hull", 0x0072B2FF), ("sum/total", 0x191919FF)):  # blue, dark
+    for part, colour in (("terms/hull", 0x55739BFF), ("sum/total", 0x191919FF)):  # slate, dark
         table = rows(rrd, rf"/force/open\ sea/yaw/{part}", "SeriesLines:colors")
         assert table["SeriesLines:colors"][0].to_list() == [colour]
 
@@ -63,7 +63,7 @@ def test_forces_stand_on_a_tab_of_their_own(with_forces):
     ]  # fmt: skip
     assert {view["in"][1:] for view in plots} == {("Forces, mmg", "open sea")}
     tabs = list(dict.fromkeys(view["in"][1] for view in displayed if len(view["in"]) > 1))
-    assert tabs == ["harbour", "open sea", "Forces, mmg", "Histograms"]
+    assert tabs == ["harbour", "open sea", "Forces, mmg", "Coverage"]
     legends = [view["view"].properties["PlotLegend"].visible for view in plots]
     assert [legend.as_arrow_array().to_pylist() for legend in legends] == [[True], [False], [False]]
 

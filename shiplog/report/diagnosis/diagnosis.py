@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import polars as pl
@@ -35,6 +36,7 @@ class Diagnosis(Shows):
     drawn      whether the pictures could be drawn
     shown      its pictures and its page
     extended   the run with the causes in it, where one was asked for and a cause is named
+    datums     voyage → latitude and longitude [deg] of its x₀ = y₀ = 0, where its log had them
     """
 
     verdict: Verdict
@@ -48,6 +50,7 @@ class Diagnosis(Shows):
     drawn: bool = True
     extended: Run | None = None
     shown: Shown | None = None
+    datums: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         named = ", ".join(self.named) or "no cause"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import polars as pl
 
@@ -17,6 +19,7 @@ from shiplog.exceptions import listed
 from shiplog.nomenclature.channels import STATE, VELOCITY
 from shiplog.report.diagnosis import page
 from shiplog.report.diagnosis.diagnosis import Diagnosis
+from shiplog.report.viewer.comparison_data import Current
 from shiplog.report.viewer.diagnosis_data import AFTER, BEFORE, ERROR_COLUMNS, TRACKS, Exhibit
 from shiplog.voyages.rows.recording import Record
 from shiplog.voyages.windows.windows import Windows
@@ -44,7 +47,19 @@ def exhibit(done: Diagnosis) -> Exhibit:
         tracks=rollouts,
         errors=errors,
         report=page.markdown(done.verdict),
+        run=Path(done.verdict.run).name,
+        datums=done.datums,
+        current=_current(decision),
     )
+
+
+def _current(decision: Decision) -> Current | None:
+    """Towards where the named current sets."""
+    for named in decision.named:
+        if named.cause.label == "current":
+            north, east = (float(one) for one in named.numbers)
+            return Current(float(np.hypot(north, east)), float(np.arctan2(east, north)))
+    return None
 
 
 def _measured(record: Record) -> pl.DataFrame:
@@ -52,7 +67,15 @@ def _measured(record: Record) -> pl.DataFrame:
     rows = np.flatnonzero(record.measured)
     rows = rows[:: max(1, round(1.0 / record.step))]
     index = {"voyage": [record.names[i] for i in record.voyage[rows]], "time": record.time[rows]}
-    return pl.DataFrame(index | _columns(record.state[rows]))
+    return pl.DataFrame(index | _columns(record.state[rows]) | _apparent_wind(record, rows))
+
+
+def _apparent_wind(record: Record, rows: np.ndarray) -> dict[str, np.ndarray]:
+    """Its speed and angle, where it was measured."""
+    if not record.profile.has_wind:
+        return {}
+    ahead, starboard = record.wind[rows].T
+    return {"wind_speed": np.hypot(ahead, starboard), "wind_angle": np.arctan2(starboard, ahead)}
 
 
 # --- forces ---------------------------------------------------------------------------------------

@@ -3,8 +3,8 @@ tables and JSON."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -70,6 +70,7 @@ class Evaluation(Shows):
                squares on the first run's data
     inside     run, channel, share: of the samples inside the 90 % band, where a run has one
     forces     of the first physical run along the voyages, as ComparisonData has them; or None
+    datums     voyage → latitude and longitude [deg] of its x₀ = y₀ = 0, where its log had them
     contradicted   what was recorded on these voyages and contradicts itself
     ship_time      L/U of the first run's training voyages
     shown          its pictures and its page
@@ -86,6 +87,7 @@ class Evaluation(Shows):
     inside: pl.DataFrame
     forces: pl.DataFrame | None
     contradicted: tuple[Contradicted, ...] = ()
+    datums: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     ship_time: ShipTime | None = None
     shown: Shown | None = None
 

@@ -5,13 +5,15 @@ SI and radians throughout; the viewer converts when it labels an axis.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import polars as pl
 
 from shiplog.nomenclature import channels
 from shiplog.nomenclature.channels import Channel
 
+TIMELINE = "sim_time"  # seconds from a voyage's start, in every recording
 BAND = ("_low", "_high")  # of a simulated state: the ends of its 90 % band
 
 
@@ -30,6 +32,31 @@ class DrawnActuator:
         return Channel(self.name, symbol, self.unit, circular=self.kind == "azimuth")
 
 
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """What a recording is opened at: its voyage is in front, and its charts are about the moment.
+
+    window   length of what they show [s], the moment in its middle
+    """
+
+    voyage: str
+    seconds: float  # from the voyage's start
+    window: float
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """The beginning and the end of what is shown [s]."""
+        return self.seconds - self.window / 2.0, self.seconds + self.window / 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Current:
+    """A current that a diagnosis named."""
+
+    speed: float  # m/s
+    direction: float  # rad, towards, clockwise from north
+
+
 @dataclass(frozen=True)
 class ComparisonData:
     """Measured voyages, and the simulations of every model and seed.
@@ -43,6 +70,10 @@ class ComparisonData:
     summary     Markdown: errors, baselines, coverage, findings
     banks       lines of (x0, y0) points a chart shows
     ship_outline  (ahead, starboard) of midship, m; a pointed box of length and breadth if empty
+    extended    those of the models that a diagnosis extended, which have a colour of their own
+    datums      voyage → latitude and longitude [deg] of x₀ = y₀ = 0, where its log had them
+    current     the one that a diagnosis named
+    moment      what it is opened at; the beginning of the first voyage unless given
     forces      model, voyage, time, part (hull, propeller, ... total), surge [N], sway [N],
                 yaw [N m] about midship: the force components along the measured voyage
     """
@@ -60,6 +91,10 @@ class ComparisonData:
     trained: str = ""
     ship_outline: tuple[tuple[float, float], ...] = ()
     forces: pl.DataFrame | None = None
+    extended: tuple[str, ...] = ()
+    datums: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    current: Current | None = None
+    moment: Moment | None = None
 
     @property
     def voyages(self) -> list[str]:

@@ -11,17 +11,16 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from shiplog.nomenclature import channels
+from shiplog.report import colours
 from shiplog.report.evaluation.text_table import inert
-from shiplog.report.viewer import display, forces, style, timeline, trajectory
+from shiplog.report.viewer import chart, display, forces, style, timeline, tracking, trajectory
 from shiplog.report.viewer.comparison_data import ComparisonData
 from shiplog.report.viewer.diagnosis_data import AFTER, BEFORE, Exhibit
 from shiplog.report.viewer.display import Drawn
 from shiplog.report.viewer.style import entity
 
 BAND_DEVIATIONS = 1.645  # standard deviations of a 90 % band
-LACKS = "model lacks (black)"  # a dark dot does not show in Rerun's dark legend
-COLOUR_NAMES = ("blue", "orange")  # style.MODEL_COLOURS: before, and after
-NAMED_COLOUR = style.MODEL_COLOURS[1]  # the force of what the model after has
+LACKS = "model lacks (black)"  # a dark dot does not show on a dark legend
 ROOM = 1.0  # sizes of the measured track that a simulated one is followed beyond it
 AXIS_OF_CHANNEL = dict(zip((c.name for c in channels.VELOCITY), forces.FORCE_AXES, strict=True))
 DRAWABLE = str.maketrans({  # Rerun's fonts lack these, and its headless viewer falls over them
@@ -35,11 +34,11 @@ class Pictured:
     """An exhibit ready to be drawn.
 
     tracks      its voyages, and of each the window that tells most as a voyage of its own
-    models      what `tracks` calls BEFORE and, where there is one, AFTER; in this order their names
-                sort, which is the order of their colours
+    models      what `tracks` calls BEFORE and, where there is one, AFTER
     closeups    voyage → the name of that window
     components  voyage, time, part, surge, sway, yaw [N, N m]: as ComparisonData.forces
     errors      voyage, time, seconds, before, after: root mean square
+    position_errors  as `tracking.with_errors`
     """
 
     exhibit: Exhibit
@@ -48,6 +47,7 @@ class Pictured:
     closeups: dict[str, str]
     components: pl.DataFrame
     errors: pl.DataFrame
+    position_errors: pl.DataFrame
 
     @property
     def voyages(self) -> list[str]:
@@ -57,15 +57,18 @@ class Pictured:
 
 def pictured(exhibit: Exhibit) -> Pictured:
     """Tables as the other views take them."""
-    models = {BEFORE: "before" if exhibit.extended else "the model"}
+    models = {BEFORE: exhibit.run or ("before" if exhibit.extended else "the model")}
     if exhibit.extended:
         models[AFTER] = f"with {_spoken(exhibit.extended)}"
     closeups, measured, tracks = {}, [], []
+    datums = dict(exhibit.datums)
     for row in exhibit.telling.to_dicts():
         begin, end = row["time"], row["time"] + row["seconds"]
         name = f"{row['voyage']}, {begin:.0f} to {end:.0f} s"
         of, within = pl.col("voyage") == row["voyage"], pl.col("time").is_between(begin, end)
         closeups[row["voyage"]] = name
+        if row["voyage"] in datums:
+            datums[name] = datums[row["voyage"]]
         measured.append(exhibit.measured.filter(of, within).with_columns(voyage=pl.lit(name)))
         tracks.append(
             exhibit.tracks.filter(of, pl.col("window") == row["window"]).with_columns(
@@ -78,8 +81,11 @@ def pictured(exhibit: Exhibit) -> Pictured:
         ship_breadth=exhibit.ship_breadth,
         ship_outline=exhibit.ship_outline,
         banks=exhibit.banks,
+        extended=(models[AFTER],) if AFTER in models else (),
+        datums=datums,
+        current=exhibit.current,
         actuators=(),
-        has_wind=False,
+        has_wind="wind_speed" in exhibit.measured.columns,
         measured=pl.concat([*measured, exhibit.measured]),
         simulated=pl.concat([*tracks, exhibit.tracks]).with_columns(
             pl.col("model").replace(models), seed=pl.lit(0), d=pl.lit(0.0)
@@ -89,9 +95,10 @@ def pictured(exhibit: Exhibit) -> Pictured:
     )
     # L is over seconds: its value per second has a root that reads as a speed
     root = [(pl.col(n) / pl.col("seconds")).sqrt().alias(n) for n in (BEFORE, AFTER)]
+    drawn = display.drawn(compared)
     return Pictured(
-        exhibit, display.drawn(compared), models, closeups, _components(exhibit),
-        exhibit.errors.with_columns(root),
+        exhibit, drawn, models, closeups, _components(exhibit),
+        exhibit.errors.with_columns(root), tracking.with_errors(drawn),
     )  # fmt: skip
 
 
@@ -142,34 +149,28 @@ def _tab(picture: Pictured, voyage: str) -> rrb.Container:
     if (picture.components["voyage"] == voyage).any():
         right += [_force(picture, voyage, axis) for axis in forces.FORCE_AXES]
     if (picture.errors["voyage"] == voyage).any():
-        right.append(_errors(picture, voyage))
+        right += [_positions(picture, voyage), _errors(picture, voyage)]
     if not right:  # too short for either
         return rrb.Vertical(left, name=voyage)
     return rrb.Horizontal(left, rrb.Vertical(*right), column_shares=[1.0, 1.45], name=voyage)
 
 
 def _in_words(picture: Pictured, voyage: str) -> str:
-    """The window's heading, which says what the colours are."""
+    """The window's heading: why this one is shown, and when it was."""
     _, unit = trajectory.in_chart_units(picture.tracks)
-    what = "Most improved" if AFTER in picture.models else "Worst"
-    lines = zip(picture.models.values(), COLOUR_NAMES, strict=False)
-    text = ", ".join(["measured black", *(f"{model} {colour}" for model, colour in lines)])
+    what = "Most improved" if voyage in picture.exhibit.improved else "Largest error"
     when = picture.closeups.get(voyage, "").removeprefix(f"{voyage}, ")
-    short = {"metres": "m", "kilometres": "km"}[unit]
-    return f"{what}, {when} [{short}]: {text}"
+    return f"{what}, {when} [{unit}]"
 
 
 def _chart(picture: Pictured, voyage: str, name: str) -> rrb.View:
     tracks, _ = trajectory.in_chart_units(picture.tracks)
-    east, north = trajectory.extent(tracks, voyage, ROOM)
-    labels = 0.08 * (east[1] - east[0])  # they stand about its edge
+    frame = trajectory.framed(tracks, voyage, ROOM, chart.FLAT)
     return rrb.Spatial2DView(
         origin=entity("track", voyage),
         name=name,
-        background=list(style.PAPER),
-        visual_bounds=rrb.VisualBounds2D(
-            x_range=[east[0] - labels, east[1]], y_range=[-north[1], -north[0]]
-        ),
+        background=style.GROUND,
+        visual_bounds=rrb.VisualBounds2D(x_range=frame.x_range, y_range=frame.y_range),
     )
 
 
@@ -186,13 +187,26 @@ def _force(picture: Pictured, voyage: str, axis: str) -> rrb.View:
     )
 
 
+def _positions(picture: Pictured, voyage: str) -> rrb.View:
+    errors = picture.position_errors.filter(pl.col("voyage") == voyage)
+    measured = picture.tracks.measured.filter(pl.col("voyage") == voyage)
+    return rrb.TimeSeriesView(
+        origin=entity("position_errors", voyage),
+        name="position error in each held-out window [m]",
+        axis_x=_whole_voyage(picture, voyage),
+        axis_y=rrb.ScalarAxis(range=tracking.position_range(errors, measured)),
+        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=False),
+        background=style.plot_background(),
+    )
+
+
 def _errors(picture: Pictured, voyage: str) -> rrb.View:
     return rrb.TimeSeriesView(
         origin=entity("errors", voyage),
         name="velocity error of each held-out window, root mean square [cm/s, or 0.1 deg/s]",
         axis_x=_whole_voyage(picture, voyage),
         axis_y=rrb.ScalarAxis(range=error_range(picture.errors)),
-        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=True),
+        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=False),
         background=style.plot_background(),
     )
 
@@ -215,9 +229,10 @@ def error_range(errors: pl.DataFrame) -> tuple[float, float]:
 
 def send(recording: rr.RecordingStream, picture: Pictured) -> None:
     """Charts, forces, errors and the report."""
-    trajectory.send(recording, picture.tracks, ROOM)
+    trajectory.send(recording, picture.tracks, ROOM, chart.FLAT)
     for voyage in picture.voyages:
         _send_forces(recording, picture, voyage)
+        _send_positions(recording, picture, voyage)
         _send_errors(recording, picture, voyage)
     text = picture.exhibit.report.translate(DRAWABLE)
     recording.log(
@@ -239,12 +254,12 @@ def _send_forces(recording: rr.RecordingStream, picture: Pictured, voyage: str) 
         band = np.column_stack([display.column(end, axis) for end in (low, high)])
         # drawn in order of names: zero, the band, what the model lacks, what was named
         for name, at, values, cuts, labels, colour, width in (
-            ("axis", ends, np.zeros((2, 1)), none, ["zero"], style.ZERO, 1.0),
-            ("band", time, band, begins, ["90 % band"] * 2, style.faded(style.MEASURED), 0.7),
-            ("lacks", time, display.column(lacks, axis)[:, None], begins, [LACKS], style.MEASURED,
+            ("axis", ends, np.zeros((2, 1)), none, ["zero"], colours.ZERO, 1.0),
+            ("band", time, band, begins, ["90 % band"] * 2, colours.faded(colours.MEASURED), 0.7),
+            ("lacks", time, display.column(lacks, axis)[:, None], begins, [LACKS], colours.MEASURED,
              1.5),
             ("named", time, display.column(named, axis)[:, None], begins,
-             [f"force of {_spoken(picture.exhibit.named)}"], NAMED_COLOUR, 1.5),
+             [f"force of {_spoken(picture.exhibit.named)}"], colours.NAMED_FORCE, 1.5),
         ):  # fmt: skip
             if np.isfinite(values).any():
                 timeline.send_lines(
@@ -253,15 +268,32 @@ def _send_forces(recording: rr.RecordingStream, picture: Pictured, voyage: str) 
                 )  # fmt: skip
 
 
+def _colours(picture: Pictured) -> dict[str, colours.Colour]:
+    return colours.colours(list(picture.models.values()), picture.tracks.extended)
+
+
+def _send_positions(recording: rr.RecordingStream, picture: Pictured, voyage: str) -> None:
+    """In each window from nought, at the start that both models share."""
+    rows = picture.position_errors.filter(pl.col("voyage") == voyage)
+    for model, colour in _colours(picture).items():
+        of = rows.filter(pl.col("model") == model)
+        timeline.send_lines(
+            recording, entity("position_errors", voyage, model), display.column(of, "time"),
+            display.column(of, tracking.POSITION)[:, None], display.pieces(of), [model], colour,
+            1.5,
+        )  # fmt: skip
+
+
 def _send_errors(recording: rr.RecordingStream, picture: Pictured, voyage: str) -> None:
     """A level line a window."""
     rows = picture.errors.filter(pl.col("voyage") == voyage)
     begin = display.column(rows, "time")
     time = np.column_stack((begin, begin + display.column(rows, "seconds"))).ravel()
-    for (name, model), colour in zip(picture.models.items(), style.MODEL_COLOURS, strict=False):
+    of = _colours(picture)
+    for name, model in picture.models.items():
         values = np.repeat(display.column(rows, name), 2)
         if np.isfinite(values).any():
             timeline.send_lines(
                 recording, entity("errors", voyage, model), time, values[:, None],
-                np.arange(2, len(time), 2), [model], colour, 3.0,
+                np.arange(2, len(time), 2), [model], of[model], 3.0,
             )  # fmt: skip

@@ -5,11 +5,13 @@ SI and radians throughout; the viewer converts when it labels an axis.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import polars as pl
 
 from shiplog.nomenclature.channels import STATE
+from shiplog.report.viewer.comparison_data import Current
 
 BEFORE, AFTER = "before", "after"
 TRACKS = {
@@ -26,7 +28,8 @@ ERROR_COLUMNS = {
 class Exhibit:
     """The residual of a model, the named causes, and their gain.
 
-    measured   voyage, time [s from the voyage's start], the six states
+    measured   voyage, time [s from the voyage's start], the six states; wind_speed and wind_angle
+               where the ship measures them
     residual   voyage, time, channel (surge, sway, yaw_rate), force, sd, named [N, N, N m]: the
                missing force, its standard deviation, and the force of the named causes at the
                same instant; null without a named cause that exerts a force
@@ -37,7 +40,8 @@ class Exhibit:
                each held-out window; null after where nothing was named, and both null where the
                model diverges and the window is in none of the figures
     report     Markdown
-    banks, ship_outline   as a Comparison has them
+    run        the name of the model's run, by which it has its colour
+    banks, ship_outline, datums, current   as a comparison has them
     """
 
     title: str
@@ -52,6 +56,9 @@ class Exhibit:
     report: str
     ship_outline: tuple[tuple[float, float], ...] = ()
     banks: tuple[tuple[tuple[float, float], ...], ...] = ()
+    run: str = ""
+    datums: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    current: Current | None = None
 
     @property
     def voyages(self) -> list[str]:
@@ -60,13 +67,19 @@ class Exhibit:
 
     @property
     def telling(self) -> pl.DataFrame:
-        """Of each voyage the row of `errors` whose error fell most, or, where nothing was named,
-        was largest; the most telling voyage first."""
-        fell = pl.col("before") - pl.col("after").fill_null(0.0)
+        """Of each voyage the row of `errors` whose error fell most, or, where none fell, was
+        largest; the most telling voyage first."""
+        fell = pl.col("before") - pl.col("after")
+        improved = pl.when(fell > 0.0).then(fell)  # null where it did not
         return (
-            self.errors.with_columns(fell=fell)
-            .sort("fell", descending=True, nulls_last=True, maintain_order=True)
+            self.errors.with_columns(fell=improved)
+            .sort("fell", "before", descending=True, nulls_last=True, maintain_order=True)
             .group_by("voyage", maintain_order=True)
             .first()
             .select(self.errors.columns)
         )
+
+    @property
+    def improved(self) -> set[str]:
+        """The voyages of which the most telling window has a smaller error after than before."""
+        return set(self.telling.filter(pl.col("after") < pl.col("before"))["voyage"])

@@ -8,6 +8,7 @@ import polars as pl
 import rerun as rr
 import rerun.blueprint as rrb
 
+from shiplog.report import colours
 from shiplog.report.viewer import display, style, timeline
 from shiplog.report.viewer.display import Drawn
 from shiplog.report.viewer.style import entity
@@ -39,7 +40,7 @@ def blueprint(drawn: Drawn, voyage: str | None) -> rrb.Container | None:
 def send(recording: rr.RecordingStream, drawn: Drawn) -> None:
     """One line per part, of one colour in every plot of every voyage."""
     rows = of_first_model(drawn)
-    colours = style.part_colours(rows["part"].unique(maintain_order=True).to_list())
+    of = colours.forces(rows["part"].unique(maintain_order=True).to_list())
     for voyage in rows["voyage"].unique(maintain_order=True):
         _send_zero(recording, voyage, rows.filter(pl.col("voyage") == voyage))
     factors = {axis: unit(rows, axis)[1] for axis in FORCE_AXES}
@@ -53,8 +54,8 @@ def send(recording: rr.RecordingStream, drawn: Drawn) -> None:
                 display.column(lines, "time"),
                 display.column(lines, axis)[:, None] / factor,
                 display.pieces(lines),
-                [part],
-                colours[part],
+                [f"{part} (black)" if whole else part],
+                of[part],
                 2.5 if whole else 1.5,
             )
 
@@ -108,7 +109,7 @@ def _send_zero(recording: rr.RecordingStream, voyage: str, rows: pl.DataFrame) -
         path = entity("force", voyage, axis, "nothing")
         none = np.empty(0, dtype=np.intp)
         timeline.send_lines(
-            recording, path, ends, np.zeros((2, 1)), none, ["zero"], style.ZERO, 1.0
+            recording, path, ends, np.zeros((2, 1)), none, ["zero"], colours.ZERO, 1.0
         )
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from shiplog.nomenclature import channels
 from shiplog.nomenclature.channels import Channel
+from shiplog.report import colours
 from shiplog.report.viewer import display, style
 from shiplog.report.viewer.display import Drawn
 from shiplog.report.viewer.style import entity
@@ -25,12 +26,14 @@ SETS = ("training", "test")
 
 
 def blueprint(drawn: Drawn, voyage: str | None) -> rrb.Container | None:
-    """A voyage's winds on its own tab; all of them on a tab of theirs."""
+    """A tab of their own."""
+    if voyage is not None:
+        return None
     winds = [
         rrb.Spatial2DView(
             origin=entity("hist", "wind", of),
             name=f"Apparent wind, {_whose(drawn, of)} [rows, log scale]",
-            background=list(style.PAPER),
+            background=style.GROUND,
             visual_bounds=_wind_bounds(drawn),
         )
         for of in (SETS if drawn.has_wind else ())
@@ -44,9 +47,7 @@ def blueprint(drawn: Drawn, voyage: str | None) -> rrb.Container | None:
         )
         for channel in _singles(drawn)
     ]
-    if voyage is not None:
-        return rrb.Horizontal(*(winds or singles[:2]))
-    return rrb.Grid(*singles, *winds, grid_columns=3, name="Histograms")
+    return rrb.Grid(*singles, *winds, grid_columns=3, name="Coverage")
 
 
 def _whose(drawn: Drawn, of: str) -> str:
@@ -62,7 +63,7 @@ def send(recording: rr.RecordingStream, drawn: Drawn) -> None:
         edges = bins(np.concatenate(list(values.values())))
         width = float(edges[1] - edges[0])
         for of, shift, colour in zip(
-            SETS, (-0.22, 0.22), (style.TRAINING, style.TEST), strict=True
+            SETS, (-0.22, 0.22), (colours.TRAINING, colours.TRIAL), strict=True
         ):
             count = np.histogram(values[of], edges)[0]
             recording.log(
@@ -154,7 +155,7 @@ def _send_axes(
             names.append(f"{rows}")
     recording.log(
         entity("hist", "wind", of, "ticks"),
-        rr.LineStrips2D(ticks, colors=style.GRID, radii=rr.Radius.ui_points(0.5), draw_order=2.0),
+        rr.LineStrips2D(ticks, colors=colours.GRID, radii=rr.Radius.ui_points(0.5), draw_order=2.0),
         static=True,
     )
     recording.log(
@@ -163,7 +164,7 @@ def _send_axes(
             marks,
             labels=names,
             show_labels=True,
-            colors=style.TICK,
+            colors=colours.TEXT,
             radii=rr.Radius.ui_points(0.0),
         ),
         static=True,
@@ -175,7 +176,7 @@ def _coloured(logarithm: NDArray[np.float64], most: float) -> NDArray[np.uint8]:
     place = np.clip(logarithm / max(most, 1e-9), 0.0, 1.0) * (len(RAMP) - 1)
     shades = [np.interp(place, np.arange(len(RAMP)), RAMP[:, i]) for i in range(3)]
     return np.where(
-        (logarithm > 0.0)[..., None], np.stack(shades, axis=-1), style.PAPER[:3]
+        (logarithm > 0.0)[..., None], np.stack(shades, axis=-1), colours.PAPER[:3]
     ).astype(np.uint8)
 
 

@@ -1,46 +1,72 @@
 """Starting Rerun's own programs: the native viewer, the web server and the headless viewer.
 
-They listen on this machine only, and send no usage statistics. A browser loads Rerun's own page
-from the web server; nothing here decides what that page sends.
+They listen on this machine only, and send no usage statistics. A browser gets the page of
+`web_page`, which asks nobody else.
 """
 
 from __future__ import annotations
 
 import contextlib
 import importlib.util
+import logging
 import os
 import socket
 import subprocess
 import sys
 import tempfile
 import time
-import urllib.parse
+import urllib.request
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
 from shiplog.exceptions import ShiplogError
 from shiplog.machine import child
+from shiplog.report.viewer import web_page
+from shiplog.report.viewer.comparison_data import TIMELINE
+
+log = logging.getLogger(__name__)
 
 HOST = "127.0.0.1"
 RERUN = f"rerun --bind {HOST}"  # as a user starts it: alone, it listens on every interface
 WITHOUT_A_WINDOW = "use --save FILE.rrd to keep the recording, or --web to look at it in a browser."
 NATIVE_PATIENCE = 2.0  # s: a viewer that has no graphics says so at once
 WEB_PATIENCE = 30.0  # s: the first start on a slow disk
+_DIRECT = urllib.request.build_opener(urllib.request.ProxyHandler({}))  # this machine, no proxy
 
 
-def open_viewer(path: str | Path) -> None:
-    """Show a recording in the native viewer, which stays open when shiplog is done."""
+def open_viewer(path: str | Path, time_s: float | None = None) -> None:
+    """Show a recording in the native viewer, which stays open when shiplog is done.
+
+    time_s   where the cursor stands at first; the recording's beginning unless given
+    """
     path = existing(path)
     if sys.platform == "linux" and not (os.getenv("DISPLAY") or os.getenv("WAYLAND_DISPLAY")):
         raise ShiplogError("No display is there to open the viewer on.", hint=WITHOUT_A_WINDOW)
+    port = free_port()
     with tempfile.TemporaryFile() as output:
-        viewer = start([str(path), "--port", "auto"], output)
+        viewer = start([str(path), "--port", str(port)], output)
         with contextlib.suppress(subprocess.TimeoutExpired):
             if viewer.wait(NATIVE_PATIENCE) != 0:
                 raise ShiplogError(
                     f"The viewer did not start: {child.last_words(output)}", hint=WITHOUT_A_WINDOW
                 )
+    if time_s is not None:
+        _put_cursor(port, time_s)
+
+
+def _put_cursor(port: int, time_s: float) -> None:
+    """Where the viewer does not take it, its charts are about the moment all the same."""
+    from rerun.experimental import ViewerClient
+
+    from shiplog.report.viewer import control
+
+    try:
+        viewer = ViewerClient(control.address(HOST, port))
+        if control.loaded(viewer) is not None:
+            control.seek(viewer, time_s)
+    except (ConnectionError, RuntimeError) as error:
+        log.warning("the viewer's cursor was not set to %g s: %s", time_s, error)
 
 
 @dataclass(frozen=True)
@@ -48,18 +74,18 @@ class Served:
     """A recording that a browser on this machine can look at, until `stop`."""
 
     address: str
-    process: subprocess.Popen
+    page: web_page.Page
 
     def wait(self) -> None:
-        """Until the server ends, or the user ends it with Ctrl-C."""
+        """Until the user ends it with Ctrl-C."""
         try:
             with contextlib.suppress(KeyboardInterrupt):
-                self.process.wait()
+                self.page.wait()
         finally:
             self.stop()
 
     def stop(self) -> None:
-        child.stop(self.process)
+        self.page.stop()
 
     def __enter__(self) -> Served:
         return self
@@ -68,23 +94,39 @@ class Served:
         self.stop()
 
 
-def serve(path: str | Path, port: int = 9090) -> Served:
-    """Serve a recording to browsers on this machine; another port is taken if `port` is in use."""
+def serve(path: str | Path, port: int = 9090, time_s: float | None = None) -> Served:
+    """Serve a recording to browsers on this machine; another port is taken if `port` is in use.
+
+    time_s   where the cursor stands at first; the recording's beginning unless given
+    """
     path = existing(path)
-    web, data = free_port(port), free_port(9876)
-    source = urllib.parse.quote(f"rerun+http://{HOST}:{data}/proxy", safe="")
+    moment = None if time_s is None else web_page.cursor_at(TIMELINE, time_s)
+    page = web_page.Page(HOST, free_port(port), path, _web_program(), moment)
+    return Served(page.address, page)
+
+
+def _web_program() -> dict[str, bytes]:
+    """Rerun's viewer for browsers, which only its own server hands out: asked, and ended."""
     with tempfile.TemporaryFile() as output:
-        arguments = [str(path), "--serve-web", "--port", str(data), "--web-viewer-port", str(web)]
+        port = free_port()
+        # told of a recording elsewhere, which it never asks for, it serves nothing but its page
+        arguments = ["--serve-web", "--web-viewer-port", str(port), f"http://{HOST}/none.rrd"]
         process = start(arguments, output, supervised=True)
         try:
-            wait_for(process, (web, data), WEB_PATIENCE)
-        except TimeoutError:
-            child.stop(process)
+            wait_for(process, (port,), WEB_PATIENCE)
+            found = {}
+            for name in web_page.PROGRAM:
+                address = f"http://{HOST}:{port}/{name}"
+                with _DIRECT.open(address, timeout=WEB_PATIENCE) as answer:
+                    found[name] = answer.read()
+            return found
+        except OSError:  # TimeoutError, and what urllib reports, are of this kind
             raise ShiplogError(
                 f"The web viewer did not start: {child.last_words(output)}",
                 hint=f"use --save FILE.rrd, and open the file with `{RERUN} FILE.rrd`.",
             ) from None
-    return Served(f"http://{HOST}:{web}/?url={source}", process)
+        finally:
+            child.stop(process)
 
 
 def start(arguments: list[str], output: IO[bytes], supervised: bool = False) -> subprocess.Popen:

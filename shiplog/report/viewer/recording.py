@@ -34,7 +34,7 @@ VIEWS = {
     "histogram": histogram,
     "report": report,
 }
-LEFT = ("trajectory", "histogram")  # of a voyage's tab, one above the other
+LEFT = "trajectory"  # of a voyage's tab
 
 
 def write(comparison: ComparisonData, path: Path) -> None:
@@ -77,23 +77,29 @@ def whole(title: str, blueprint: rrb.Blueprint, path: Path) -> Iterator[rr.Recor
 
 
 def layout(picture: Drawn) -> rrb.Blueprint:
-    """A tab a voyage, the track left and time right, then what belongs to no voyage alone."""
+    """A tab a voyage, the track left and time right, then what belongs to no voyage alone. In
+    front is the first, or that of the moment at which the recording is opened."""
     tabs: list[rrb.View | rrb.Container] = []
-    for voyage in picture.voyages[: display.MOST_TABS]:
+    voyages = picture.voyages
+    if (moment := picture.moment) is not None and moment.voyage in voyages[display.MOST_TABS :]:
+        voyages = [moment.voyage, *voyages]
+    voyages = voyages[: display.MOST_TABS]
+    for voyage in voyages:
         parts = {name: view.blueprint(picture, voyage) for name, view in VIEWS.items()}
-        left = [part for name in LEFT if (part := parts.pop(name)) is not None]
+        track = parts.pop(LEFT)
+        assert track is not None
         right = [part for part in parts.values() if part is not None]
-        track = rrb.Vertical(*left, row_shares=[2.2, 1.0][: len(left)])
         tabs.append(rrb.Horizontal(track, *right, column_shares=[1.0, 1.45], name=voyage))
     own = (view.blueprint(picture, None) for view in VIEWS.values())
     tabs += [part for part in own if part is not None]
-    return screen(tabs)
+    front = voyages.index(moment.voyage) if moment and moment.voyage in voyages else 0
+    return screen(tabs, front)
 
 
-def screen(tabs: Sequence[rrb.View | rrb.Container]) -> rrb.Blueprint:
-    """Nothing but these tabs, the first one in front, and the time below."""
+def screen(tabs: Sequence[rrb.View | rrb.Container], front: int = 0) -> rrb.Blueprint:
+    """Nothing but these tabs, that one in front, and the time below."""
     return rrb.Blueprint(
-        rrb.Tabs(*tabs, active_tab=0),
+        rrb.Tabs(*tabs, active_tab=front),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.TimePanel(state="collapsed", timeline=style.TIMELINE, play_state="paused"),

@@ -14,13 +14,18 @@ LEGEND = """
 
 - Every window starts at the measured state (dots); from there on a model sees only the measured
   actuators and apparent wind.
-- Black is measured. A model has one colour everywhere: its bold line is the seed whose mean error
-  is the median of its seeds, the pale lines are the other seeds (on tracks) or the lowest and
-  highest of all seeds (along time). Of a model that knows its doubt the pale lines along time are
-  the 90 % band of its bold line instead, except for d.
-- Hulls are to scale. The earth axes are x₀ north and y₀ east, the wind's angle is where it blows
-  from, clockwise from the bow.
-- d is the error of Eq. 5; histograms and d are drawn as log10(1 + value).
+- Black is measured. A run has one colour in every picture, and one that a diagnosis extended is
+  always vermillion. A bold line is the seed whose mean error is the median of its seeds, the pale
+  lines are the other seeds (on tracks) or the lowest and highest of all seeds (along time). Of a
+  model that knows its doubt the pale lines along time are the 90 % band of its bold line instead,
+  except for the errors.
+- Errors are how far the simulated ship is from the measured one [m], and how far its heading is
+  off, positive to starboard [deg]. The axis of positions ends where the measured track is as wide.
+- Hulls are to scale. The earth axes are x₀ north and y₀ east. The arrows are means of the voyage:
+  the true wind as it blows, named by where it comes from, and a named current as it sets. The
+  apparent wind's angle is where it blows from, clockwise from the bow.
+- Headings begin anew at 180 or 360 deg, and so do their lines.
+- Histograms are drawn as log10(1 + rows).
 """
 FORCES = """- Forces are what {model} says each part exerts, along the measured voyage: surge
   positive ahead, sway to starboard, yaw bow to starboard. The wide dark line is their total.

@@ -1,8 +1,10 @@
-"""Everything along time: the error, the six states, the actuators and the apparent wind."""
+"""Everything along time: errors, states, actuators and the apparent wind."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 import polars as pl
@@ -11,59 +13,145 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from shiplog.nomenclature import channels
-from shiplog.report.viewer import display, style
+from shiplog.report import colours
+from shiplog.report.viewer import display, style, tracking
 from shiplog.report.viewer.comparison_data import BAND
 from shiplog.report.viewer.display import Drawn
 from shiplog.report.viewer.style import entity
 
-POSITION_TITLES = {"x0": "north x₀ [m]", "y0": "east y₀ [m]"}  # x₀ alone says little
-IN_THE_FIRST_COLUMN = ("surge", "sway", "yaw_rate", "heading")  # the others are one column on
+STATES = ("surge", "sway", "yaw_rate", "heading")  # drawn; where it was, the chart shows
+LEGEND_ROOM = 0.22  # of the voyage, free at the end of plots with a legend
+HALF_TURN = 180.0  # deg
+LONG = 10_000  # instants: more than ten for each point of the widest plot
+FITS_A_TITLE = 22  # letters after what stands in the longest one
+SPREAD = ("_lowest", "_highest")  # of all seeds
+CURVES: dict[str, tuple[str, ...]] = {  # column → its entity, in which the voyage comes second
+    **{c.name: ("state", c.name) for c in channels.STATE},
+    tracking.POSITION: ("error", "position"), tracking.HEADING: ("error", "heading"),
+}  # fmt: skip
+
+
+# Kind, rows, suffixes of its columns, names, colour, width.
+Lines = tuple[str, pl.DataFrame, tuple[str, ...], list[str], colours.Colour, float]
+
+
+@dataclass(frozen=True)
+class Plot:
+    """One axis along time: its title, its entity, from where to where it shows."""
+
+    title: str
+    origin: tuple[str, ...]
+    reach: tuple[float, float] | None
+    legend: bool = False
 
 
 def blueprint(drawn: Drawn, voyage: str | None) -> rrb.Container | None:
     """Two columns of plots, each over the whole voyage: a linked time axis would not show it."""
     if voyage is None:
         return None
-    rows = drawn.measured.filter(pl.col("voyage") == voyage)
-    whole = whole_voyage(rows)
-    simulated = drawn.simulated.filter(pl.col("voyage") == voyage)
+    of = pl.col("voyage") == voyage
+    here = replace(drawn, simulated=drawn.simulated.filter(of), measured=drawn.measured.filter(of))
+    columns = []
+    for plots in plots_of(drawn, voyage, tracking.with_errors(here)):
+        legends = any(plot.legend for plot in plots)
+        axis = time_axis(drawn, voyage, LEGEND_ROOM if legends else 0.04)
+        views = [
+            rrb.TimeSeriesView(
+                origin=entity(*plot.origin),
+                name=plot.title,
+                axis_x=axis,
+                axis_y=None if plot.reach is None else rrb.ScalarAxis(range=plot.reach),
+                plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=plot.legend),
+                background=style.plot_background(),
+            )
+            for plot in plots
+        ]
+        columns.append(rrb.Vertical(*views))
+    return rrb.Horizontal(*columns, column_shares=[1.25, 1.0][: len(columns)])
 
-    def plot(
-        name: str, *origin: str, legend: bool = False, shows: list[str] | None = None
-    ) -> rrb.View:
-        reach = readable_range(rows, simulated, shows) if shows else None
-        return rrb.TimeSeriesView(
-            origin=entity(*origin),
-            name=name,
-            axis_x=whole,
-            axis_y=None if reach is None else rrb.ScalarAxis(range=reach),
-            plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=legend),
-            background=style.plot_background(),
-        )
 
+def plots_of(drawn: Drawn, voyage: str, errors: pl.DataFrame) -> list[list[Plot]]:
+    """First how far each model is off and the states, then what acted on ship and models.
+
+    errors   as `tracking.with_errors`
+    """
+    rows = shown(drawn, voyage, drawn.measured.filter(pl.col("voyage") == voyage))
+    simulated = shown(drawn, voyage, errors.filter(pl.col("voyage") == voyage))
+    titles = {c.name: c.label for c in channels.STATE if c.name in STATES}
     seeds = display.drawn_seeds(drawn)
     banded = [m for m in drawn.models if display.has_band(_bold(simulated, m, seeds[m]), "surge")]
-    titles = {c.name: POSITION_TITLES.get(c.name, c.label) for c in channels.STATE}
     if banded:  # named once: a legend would hide a third of so flat a plot
-        titles["surge"] += f", pale lines: 90 % band of {', '.join(banded)}"
-    states = {
-        name: plot(title, "state", voyage, name, shows=[name]) for name, title in titles.items()
-    }
-    first = [plot("error: log10(1 + d), dots where a window starts", "error", voyage, legend=True)]
-    first += [states.pop(name) for name in IN_THE_FIRST_COLUMN]
-    second: list[rrb.View | rrb.Container] = [rrb.Horizontal(*states.values())]
-    second += [
-        plot(f"{'s, '.join(kinds)}s [{unit}]", "actuator", voyage, group, legend=True, shows=names)
+        whose = f" of {', '.join(banded)}"
+        titles["surge"] += ", pale lines: 90 % band" + whose * (len(whose) <= FITS_A_TITLE)
+    first: list[Plot] = []
+    if not simulated.is_empty():
+        reach = tracking.position_range(simulated, rows)
+        origin = ("error", voyage, "position")
+        first.append(Plot("position error [m], dots: window starts", origin, reach))
+        reach = tracking.heading_range(simulated)
+        first.append(Plot("heading error [deg]", ("error", voyage, "heading"), reach))
+    for name in STATES:
+        reach = readable_range(rows, simulated, [name])
+        if name == "heading":
+            seam = compass_seam(drawn, voyage)
+            reach = (seam - 2.0 * HALF_TURN - 8.0, seam + 8.0)
+        first.append(Plot(titles[name], ("state", voyage, name), reach))
+    second = [
+        Plot(
+            f"{_plural(kinds, names)} [{unit}]",
+            ("actuator", voyage, group),
+            readable_range(rows, simulated, names),
+            legend=len(names) > 1,
+        )
         for group, (kinds, unit, names) in actuator_groups(drawn).items()
     ]
     if drawn.has_wind:
-        second += [
-            plot(f"apparent {c.label}", "wind", voyage, c.name, shows=[c.name])
-            for c in channels.WIND
-        ]
-    return rrb.Horizontal(
-        rrb.Vertical(*first, row_shares=[1.15, 0.95, 0.95, 0.95, 1.1]), rrb.Vertical(*second)
-    )
+        for c in channels.WIND:
+            reach = readable_range(rows, simulated, [c.name])
+            second.append(Plot(f"apparent {c.label}", ("wind", voyage, c.name), reach))
+    return [first, second] if second else [first]
+
+
+def _plural(kinds: list[str], names: list[str]) -> str:
+    return ", ".join(kinds) if len(names) == 1 else ", ".join(f"{kind}s" for kind in kinds)
+
+
+def time_axis(drawn: Drawn, voyage: str, after: float = 0.04) -> rrb.TimeAxis:
+    """Over the whole voyage, or what is about a moment of it."""
+    if (moment := drawn.moment) is None or moment.voyage != voyage:
+        return whole_voyage(drawn.measured.filter(pl.col("voyage") == voyage), after)
+    begin, end = moment.span
+    return _span(begin, end + after * moment.window)
+
+
+def shown(drawn: Drawn, voyage: str, table: pl.DataFrame) -> pl.DataFrame:
+    """The rows that are on the time axis at first, which its other axis is made for."""
+    if (moment := drawn.moment) is None or moment.voyage != voyage:
+        return table
+    near = table.filter(pl.col("time").is_between(*moment.span))
+    return table if near.is_empty() else near
+
+
+def compass_seam(drawn: Drawn, voyage: str) -> float:
+    """Where headings begin anew, 180 or 360 deg: what the measured one crosses less often."""
+    rows = drawn.measured.filter(pl.col("voyage") == voyage)
+    heading = display.column(rows, "heading")
+    crossings = {
+        seam: int((np.abs(np.diff(on_compass(heading, seam))) > HALF_TURN).sum())
+        for seam in (2.0 * HALF_TURN, HALF_TURN)
+    }
+    return min(crossings, key=lambda seam: crossings[seam])
+
+
+def on_compass(heading: NDArray[np.float64], seam: float) -> NDArray[np.float64]:
+    """A heading that counts on [deg], within the turn that ends at `seam`."""
+    return (heading - seam) % (2.0 * HALF_TURN) + seam - 2.0 * HALF_TURN
+
+
+def broken_at_seam(values: NDArray[np.float64], begins: NDArray[np.intp]) -> NDArray[np.intp]:
+    """`begins`, and where a bearing [N] or [N, K] passes its seam, which is no jump."""
+    step = np.abs(np.diff(values, axis=0)) > HALF_TURN
+    return np.union1d(begins, np.flatnonzero(step if step.ndim == 1 else step.any(axis=1)) + 1)
 
 
 def whole_voyage(rows: pl.DataFrame, after: float = 0.04) -> rrb.TimeAxis:
@@ -72,21 +160,48 @@ def whole_voyage(rows: pl.DataFrame, after: float = 0.04) -> rrb.TimeAxis:
     after    share of the voyage that is left free at its end, where the legend stands
     """
     time = display.column(rows, "time")
-    before = 0.04 * float(np.ptp(time))
-    whole = rrb.TimeRange(
-        start=rrb.TimeRangeBoundary.absolute(seconds=float(np.min(time)) - before),
-        end=rrb.TimeRangeBoundary.absolute(seconds=float(np.max(time) + after * np.ptp(time))),
+    length = float(np.ptp(time))
+    return _span(float(np.min(time)) - 0.04 * length, float(np.max(time)) + after * length)
+
+
+def _span(begin: float, end: float) -> rrb.TimeAxis:
+    span = rrb.TimeRange(
+        start=rrb.TimeRangeBoundary.absolute(seconds=begin),
+        end=rrb.TimeRangeBoundary.absolute(seconds=end),
     )
-    return rrb.TimeAxis(link="Independent", view_range=whole)
+    return rrb.TimeAxis(link="Independent", view_range=span)
 
 
 def send(recording: rr.RecordingStream, drawn: Drawn) -> None:
     """Every channel of every voyage, whole columns at a time."""
     measured = drawn.measured
-    simulated = drawn.simulated
+    simulated = tracking.with_errors(drawn)
     for voyage in drawn.voyages:
         _send_measured(recording, drawn, voyage, measured.filter(pl.col("voyage") == voyage))
         _send_simulated(recording, drawn, voyage, simulated.filter(pl.col("voyage") == voyage))
+        if (moment := drawn.moment) is not None and moment.voyage == voyage:
+            for plot in chain(*plots_of(drawn, voyage, simulated)):
+                _mark(recording, plot, moment.seconds)
+
+
+def _mark(recording: rr.RecordingStream, plot: Plot, seconds: float) -> None:
+    """An upright line at the moment: a recording's cursor is at its beginning when it is opened
+    again."""
+    if plot.reach is None:
+        return
+    ends = np.array([[plot.reach[0]], [plot.reach[1]]])
+    at = np.array([seconds, seconds + 1e-3])  # of two values at one instant only one is drawn
+    path = entity(*plot.origin, "moment")
+    send_lines(
+        recording,
+        path,
+        at,
+        ends,
+        np.empty(0, dtype=np.intp),
+        ["the moment (black)"],
+        colours.TEXT,
+        0.7,
+    )
 
 
 def readable_range(
@@ -140,65 +255,58 @@ def _send_measured(
     recording: rr.RecordingStream, drawn: Drawn, voyage: str, rows: pl.DataFrame
 ) -> None:
     time, begins = display.column(rows, "time"), display.pieces(rows)
+    seam = compass_seam(drawn, voyage)
 
     def line(
-        path: str, channel: channels.Channel, colour: style.Colour, name: str, width: float = 1.25
+        path: str, channel: channels.Channel, colour: colours.Colour, name: str, width: float = 1.25
     ) -> None:
-        values = display.column(rows, channel.name)
-        breaks = begins
-        if channel.circular and channel.name != "heading":  # a bearing passing north is no jump
-            jumps = np.flatnonzero(np.abs(np.diff(values)) > 180.0) + 1
-            breaks = np.union1d(begins, jumps)
+        values, breaks = display.column(rows, channel.name), begins
+        if channel.name == "heading":
+            values = on_compass(values, seam)
+        if channel.circular:
+            breaks = broken_at_seam(values, begins)
         send_lines(recording, path, time, values[:, None], breaks, [name], colour, width)
 
-    for channel in channels.STATE:
+    for channel in channels.STATE:  # wide: visible under a model that is right
         path = entity("state", voyage, channel.name, "measured")
-        line(path, channel, style.MEASURED, "measured", 2.5)  # visible under a model that is right
+        line(path, channel, colours.MEASURED, "measured", 2.5)
     by_name = {actuator.name: actuator for actuator in drawn.actuators}
     for group, (_, _, names) in actuator_groups(drawn).items():
         for i, name in enumerate(names):
             path = entity("actuator", voyage, group, name)
-            colour = style.ACTUATOR_COLOURS[i % len(style.ACTUATOR_COLOURS)]
+            colour = colours.ACTUATORS[i % len(colours.ACTUATORS)]
             line(path, by_name[name].channel, colour, name.replace("_", " "))
     if drawn.has_wind:
         for channel in channels.WIND:
-            line(entity("wind", voyage, channel.name), channel, style.MEASURED, channel.label)
+            line(entity("wind", voyage, channel.name), channel, colours.MEASURED, channel.label)
 
 
 def _send_simulated(
     recording: rr.RecordingStream, drawn: Drawn, voyage: str, simulated: pl.DataFrame
 ) -> None:
     seeds = display.drawn_seeds(drawn)
-    simulated = simulated.with_columns(d=(1.0 + pl.col("d")).log10())
-    curves: list[tuple[str, tuple[str, ...]]] = [
-        (c.name, ("state", voyage, c.name)) for c in channels.STATE
-    ]
-    curves.append(("d", ("error", voyage)))
-    for model, colour in style.colours(drawn.models).items():
+    seam = compass_seam(drawn, voyage)
+    for model, colour in colours.colours(drawn.models, drawn.extended).items():
         rollouts = simulated.filter(pl.col("model") == model)
         bold = _bold(simulated, model, seeds[model])
-        time, begins = display.column(bold, "time"), display.pieces(bold)
         spread = _spread(rollouts) if rollouts["seed"].n_unique() > 1 else None
-        for name, parent in curves:
-            values = display.column(bold, name)[:, None]
-            path = entity(*parent, "simulated", model)
-            send_lines(recording, path, time, values, begins, [model], colour, 1.25)
+        for name, parent in CURVES.items():
+            lines: list[Lines] = [("simulated", bold, ("",), [model], colour, 1.25)]
             if display.has_band(bold, name):  # what the model itself doubts, not how training went
-                rows, ends, kind, thin = bold, BAND, "band", "90 % band"
+                lines.append(("band", bold, BAND, ["90 % band"] * 2, colours.faded(colour), 0.7))
             elif spread is not None:
-                rows, ends, kind, thin = spread, SPREAD, "seeds", "lowest, highest seed"
-            else:
-                continue
-            send_lines(
-                recording,
-                entity(*parent, kind, model),  # drawn in order of names: before simulated
-                display.column(rows, "time"),
-                np.column_stack([display.column(rows, name + end) for end in ends]),
-                display.pieces(rows),
-                [thin] * 2,  # of one name: one line in the legend
-                style.faded(colour),
-                0.7,
-            )
+                ends = ["lowest, highest seed"] * 2  # of one name: one line in a legend
+                lines.append(("seeds", spread, SPREAD, ends, colours.faded(colour), 0.7))
+            for kind, rows, suffixes, names, of, width in lines:
+                values = np.column_stack([display.column(rows, name + end) for end in suffixes])
+                begins = display.pieces(rows)
+                if name == "heading":
+                    values = on_compass(values, seam)
+                    begins = broken_at_seam(values, begins)
+                # drawn in order of names: what is pale before what was simulated
+                path = entity(parent[0], voyage, *parent[1:], kind, model)
+                time = display.column(rows, "time")
+                send_lines(recording, path, time, values, begins, names, of, width)
     _send_window_starts(recording, voyage, simulated)
 
 
@@ -206,12 +314,9 @@ def _bold(simulated: pl.DataFrame, model: str, seed: int) -> pl.DataFrame:
     return simulated.filter(pl.col("model") == model, pl.col("seed") == seed)
 
 
-SPREAD = ("_lowest", "_highest")
-
-
 def _spread(rollouts: pl.DataFrame) -> pl.DataFrame:
     """The lowest and the highest of all seeds at every instant."""
-    names = [*(c.name for c in channels.STATE), "d"]
+    names = list(CURVES)
     return (
         rollouts.group_by("window", "time")
         .agg(
@@ -229,11 +334,14 @@ def _send_window_starts(
     time = starts["time"].unique(maintain_order=True).to_numpy()
     if not len(time):
         return
-    path = entity("error", voyage, "window_starts")
+    path = entity("error", voyage, "position", "window_starts")
     recording.log(
         path,
         rr.SeriesPoints(
-            colors=style.MEASURED, markers="Circle", marker_sizes=2.5, names="window starts"
+            colors=colours.MEASURED,
+            markers="Circle",
+            marker_sizes=2.5,
+            names="window starts (black)",
         ),
         static=True,
     )
@@ -251,7 +359,7 @@ def send_lines(
     values: NDArray[np.float64],
     begins: NDArray[np.intp],
     names: list[str],
-    colour: style.Colour,
+    colour: colours.Colour,
     width: float,
 ) -> None:
     """Lines of values [N, K], with a row of NaN before each of `begins`, which breaks them."""
@@ -267,7 +375,8 @@ def send_lines(
             colors=[colour] * count,
             widths=[width] * count,
             names=names,
-            aggregation_policy="Off",  # averaging over pixels would round off the peaks
+            # averaging over pixels would round off the peaks; of a long line each pixel's ends stay
+            aggregation_policy="Off" if len(time) <= LONG else "MinMax",
         ),
         static=True,
     )

@@ -14,7 +14,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from shiplog.report.viewer import display, style
+from shiplog.report import colours
+from shiplog.report.viewer import chart, display, style, surroundings
+from shiplog.report.viewer.comparison_data import Moment
 from shiplog.report.viewer.display import Drawn
 from shiplog.report.viewer.style import entity
 
@@ -24,6 +26,10 @@ HULL = np.array(  # (ahead, starboard) in ship lengths and breadths: a transom a
 )  # fmt: skip
 NORTHWARD = pl.DataFrame({"x0": [0.0], "y0": [0.0], "heading": [0.0]})
 FARTHEST_M = 500.0  # m
+METRES = {"m": 1.0, "km": 1000.0}  # in a unit of the chart
+MEASURED = "measured"
+LONG = 20_000  # points of tracks, beyond which a software renderer takes many seconds
+COARSE = 1.0 / 2000.0  # of the chart: less than a point of a screen
 MOST_HULLS = 60  # on one track: more would hide the lines
 
 
@@ -32,28 +38,67 @@ def blueprint(drawn: Drawn, voyage: str | None) -> rrb.View | None:
     if voyage is None:
         return None
     drawn, unit = in_chart_units(drawn)
-    east, north = extent(drawn, voyage)
-    every = hull_interval(drawn.measured.filter(pl.col("voyage") == voyage), drawn.ship_length)
+    rows = drawn.measured.filter(pl.col("voyage") == voyage)
+    frame = framed(drawn, voyage, about=drawn.moment)
+    every = hull_interval(rows, drawn.ship_length)
     return rrb.Spatial2DView(
         origin=entity("track", voyage),
-        name=f"Track, north up, {unit}: measured black, hull every {every:g} s, dots start windows",
-        background=list(style.PAPER),
-        visual_bounds=rrb.VisualBounds2D(x_range=list(east), y_range=[-north[1], -north[0]]),
+        name=f"Track [{unit}], hull every {every:g} s, dots: window starts",
+        background=style.GROUND,
+        visual_bounds=rrb.VisualBounds2D(x_range=frame.x_range, y_range=frame.y_range),
     )
 
 
-def send(recording: rr.RecordingStream, drawn: Drawn, room: float = 0.0) -> None:
-    """Tracks and hulls of every voyage, measured and simulated. `room`: as for `extent`."""
-    drawn, _ = in_chart_units(drawn)
+def framed(
+    drawn: Drawn,
+    voyage: str,
+    room: float = 0.0,
+    view: tuple[float, float] = chart.TALL,
+    about: Moment | None = None,
+) -> chart.Frame:
+    """The chart of a voyage in chart units, or of what is about a moment of it.
+
+    view   the size of its view [points]
+    """
+    entries = list(key(drawn))
+    if about is not None and about.voyage == voyage:
+        begin, end = about.span
+        within = pl.col("time").is_between(begin, end)
+        drawn = replace(
+            drawn,
+            measured=drawn.measured.filter(within),
+            simulated=drawn.simulated.filter(within),
+        )
+    return chart.frame(*extent(drawn, voyage, room), entries, view, voyage in drawn.datums)
+
+
+def key(drawn: Drawn) -> dict[str, colours.Colour]:
+    """What the colours of the chart are."""
+    return {MEASURED: colours.MEASURED, **colours.colours(drawn.models, drawn.extended)}
+
+
+def send(
+    recording: rr.RecordingStream,
+    drawn: Drawn,
+    room: float = 0.0,
+    view: tuple[float, float] = chart.TALL,
+) -> None:
+    """Tracks and hulls of every voyage, measured and simulated.
+
+    room, view   as for `framed`
+    """
+    drawn, unit = in_chart_units(drawn)
     measured = drawn.measured
     simulated = drawn.simulated
     seeds = display.drawn_seeds(drawn)
     for voyage in drawn.voyages:
-        _send_chart(recording, drawn, voyage, room)
         rows = measured.filter(pl.col("voyage") == voyage)
+        _send_chart(recording, drawn, voyage, unit, room, view)
         _send_measured(recording, drawn, voyage, rows)
+        if drawn.moment is not None and drawn.moment.voyage == voyage:
+            _mark(recording, voyage, rows, drawn.moment)
         _send_window_starts(recording, voyage, simulated.filter(pl.col("voyage") == voyage))
-        for model, colour in style.colours(drawn.models).items():
+        for model, colour in colours.colours(drawn.models, drawn.extended).items():
             rollouts = simulated.filter(pl.col("voyage") == voyage, pl.col("model") == model)
             bold = pl.col("seed") == seeds[model]
             _send_simulated(recording, drawn, voyage, model, colour, rollouts.filter(bold))
@@ -62,7 +107,7 @@ def send(recording: rr.RecordingStream, drawn: Drawn, room: float = 0.0) -> None
                 entity("track", voyage, "seeds", model),
                 rr.LineStrips2D(
                     others,
-                    colors=style.faded(colour),
+                    colors=colours.faded(colour),
                     radii=rr.Radius.ui_points(0.5),
                     draw_order=12.0,
                 ),
@@ -74,7 +119,7 @@ def in_chart_units(drawn: Drawn) -> tuple[Drawn, str]:
     """Metres, or kilometres at sea: Rerun 0.41 pales lines far from the origin of a 2D view."""
     places = np.concatenate([display.column(drawn.measured, name) for name in ("x0", "y0")])
     if not (np.abs(places) > FARTHEST_M).any():
-        return drawn, "metres"
+        return drawn, "m"
     km = [pl.col(name) / 1000.0 for name in ("x0", "y0")]
     small = replace(
         drawn,
@@ -85,7 +130,7 @@ def in_chart_units(drawn: Drawn) -> tuple[Drawn, str]:
         simulated=drawn.simulated.with_columns(km),
         banks=tuple(tuple((x / 1000.0, y / 1000.0) for x, y in bank) for bank in drawn.banks),
     )
-    return small, "kilometres"
+    return small, "km"
 
 
 def positions(table: pl.DataFrame) -> NDArray[np.float64]:
@@ -120,12 +165,6 @@ def hull_interval(rows: pl.DataFrame, length: float) -> float:
     return float(next((c for c in choices if c >= least), 3600 * math.ceil(least / 3600)))
 
 
-def grid_step(extent: float) -> float:
-    """Metres between grid lines: 1, 2 or 5 times a power of ten, some five lines a side."""
-    power = 10.0 ** math.floor(math.log10(extent / 5.0))
-    return next(power * k for k in (1.0, 2.0, 5.0, 10.0) if extent / (power * k) <= 7.5)
-
-
 def _send_measured(
     recording: rr.RecordingStream, drawn: Drawn, voyage: str, rows: pl.DataFrame
 ) -> None:
@@ -133,7 +172,7 @@ def _send_measured(
         entity("track", voyage, "measured"),
         rr.LineStrips2D(
             _lines(positions(rows), display.pieces(rows)),
-            colors=style.MEASURED,
+            colors=colours.MEASURED,
             radii=rr.Radius.ui_points(1.25),
             draw_order=10.0,
         ),
@@ -145,13 +184,34 @@ def _send_measured(
         entity("track", voyage, "measured", "hulls"),
         rr.LineStrips2D(
             _whole(hulls(marks, outline(drawn))),
-            colors=style.faded(style.MEASURED, 0.8),
+            colors=colours.faded(colours.MEASURED, 0.8),
             radii=rr.Radius.ui_points(0.5),
             draw_order=11.0,
         ),
         static=True,
     )
-    _send_moving_hull(recording, drawn, voyage, "measured", style.MEASURED, rows)
+    _send_moving_hull(recording, drawn, voyage, "measured", colours.MEASURED, rows)
+
+
+def _mark(recording: rr.RecordingStream, voyage: str, rows: pl.DataFrame, moment: Moment) -> None:
+    """Where the ship was at the moment."""
+    time, places = display.column(rows, "time"), positions(rows)
+    known = np.isfinite(places).all(axis=1)
+    if not known.any():
+        return
+    place = [float(np.interp(moment.seconds, time[known], axis)) for axis in places[known].T]
+    recording.log(
+        entity("track", voyage, "moment"),
+        rr.Points2D(
+            [place],
+            labels=[f"{moment.seconds:g} s"],
+            show_labels=True,
+            colors=colours.TEXT,
+            radii=rr.Radius.ui_points(6.0),
+            draw_order=35.0,
+        ),
+        static=True,
+    )
 
 
 def _send_simulated(
@@ -159,7 +219,7 @@ def _send_simulated(
     drawn: Drawn,
     voyage: str,
     model: str,
-    colour: style.Colour,
+    colour: colours.Colour,
     rollouts: pl.DataFrame,
 ) -> None:
     recording.log(
@@ -184,8 +244,8 @@ def _send_window_starts(
         entity("track", voyage, "window_starts"),
         rr.Points2D(
             points[np.isfinite(points).all(axis=1)],
-            colors=style.MEASURED,
-            radii=rr.Radius.ui_points(3.5),
+            colors=colours.MEASURED,
+            radii=rr.Radius.ui_points(3.5 if len(points) <= MOST_HULLS else 1.5),
             draw_order=25.0,
         ),
         static=True,
@@ -197,7 +257,7 @@ def _send_moving_hull(
     drawn: Drawn,
     voyage: str,
     whose: str,
-    colour: style.Colour,
+    colour: colours.Colour,
     rows: pl.DataFrame,
 ) -> None:
     heading = np.radians(display.column(rows, "heading"))
@@ -229,64 +289,37 @@ def _send_moving_hull(
     )
 
 
-def _round(span: tuple[float, float], step: float, beyond: float = 0.0) -> np.ndarray:
-    """The multiples of `step` in a span [m], and so far beyond it."""
-    first, last = math.ceil((span[0] - beyond) / step), math.floor((span[1] + beyond) / step)
-    return np.arange(first, last + 1) * step
-
-
-def _send_chart(recording: rr.RecordingStream, drawn: Drawn, voyage: str, room: float) -> None:
-    """Grid lines at round metres, and what the site has."""
-    east, north = extent(drawn, voyage, room)
-    step = grid_step(max(east[1] - east[0], north[1] - north[0]))
-    beyond = 3 * step  # lines go on where the view is wider than the track
-    meridians, parallels = _round(east, step, beyond), _round(north, step, beyond)
-    grid = [[(x, -north[1] - beyond), (x, beyond - north[0])] for x in meridians]
-    grid += [[(east[0] - beyond, -y), (east[1] + beyond, -y)] for y in parallels]
-    recording.log(
-        entity("track", voyage, "grid"),
-        rr.LineStrips2D(grid, colors=style.GRID, radii=rr.Radius.ui_points(0.5), draw_order=1.0),
-        static=True,
-    )
-    inside = 0.04 * (north[1] - north[0])
-    meridians, parallels = _round(east, step), _round(north, step)  # none in a narrow chart
-    places = [(x, -north[0] - inside) for x in meridians]
-    places += [(east[0], -y) for y in parallels]
-    names = [f"y₀ {x:g}" for x in meridians] + [f"x₀ {y:g}" for y in parallels]
-    recording.log(
-        entity("track", voyage, "grid", "labels"),
-        rr.Points2D(
-            places,
-            labels=names,
-            show_labels=True,
-            colors=style.TICK,
-            radii=rr.Radius.ui_points(0.0),
-        ),
-        static=True,
-    )
+def _send_chart(
+    recording: rr.RecordingStream,
+    drawn: Drawn,
+    voyage: str,
+    unit: str,
+    room: float,
+    view: tuple[float, float],
+) -> None:
+    """What stands about the tracks, and what the site has."""
+    frame = framed(drawn, voyage, room, view, drawn.moment)
+    datum = drawn.datums.get(voyage)
+    chart.send_grid(recording, voyage, frame, METRES[unit], datum)
+    rows = drawn.measured.filter(pl.col("voyage") == voyage)
+    wind = surroundings.mean_true_wind(rows) if drawn.has_wind else None
+    chart.send_arrows(recording, voyage, frame, unit, wind, drawn.current)
+    chart.send_key(recording, voyage, frame, key(drawn))
     if drawn.banks:
         recording.log(
             entity("track", voyage, "banks"),
             rr.LineStrips2D(
                 [[(y, -x) for x, y in bank] for bank in drawn.banks],
-                colors=style.BANK,
+                colors=colours.BANK,
                 radii=rr.Radius.ui_points(2.0),
                 draw_order=2.0,
             ),
             static=True,
         )
-        middles = [np.mean([(y, -x) for x, y in bank], axis=0) for bank in drawn.banks]
-        recording.log(
-            entity("track", voyage, "banks", "labels"),
-            rr.Points2D(
-                middles,
-                labels=["bank"] * len(middles),
-                show_labels=True,
-                colors=style.TICK,
-                radii=rr.Radius.ui_points(0.0),
-            ),
-            static=True,
-        )
+        below = np.array((0.0, chart.LINE * frame.point))  # not on a coordinate, which are round
+        middles = [np.mean([(y, -x) for x, y in bank], axis=0) + below for bank in drawn.banks]
+        path = entity("track", voyage, "banks", "labels")
+        style.labels(recording, path, middles, ["bank"] * len(middles))
 
 
 def extent(
@@ -343,7 +376,21 @@ def _lines(points: NDArray[np.float64], begins: NDArray[np.intp]) -> list[NDArra
     for piece in np.split(points, begins):
         valid = np.isfinite(piece[:, 0] + piece[:, 1])
         lines += [part for part in _runs(piece, valid) if len(part) > 1]
-    return lines
+    if len(points) <= LONG:
+        return lines
+    known = points[np.isfinite(points).all(axis=1)]
+    step = COARSE * float(np.ptp(known, axis=0).max())
+    return [_coarser(line, step) for line in lines]
+
+
+def _coarser(line: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+    """A line with fewer points, of each `step` along it the first: none is farther off."""
+    if step == 0.0:
+        return line[[0, -1]]
+    sailed = np.cumsum(np.linalg.norm(np.diff(line, axis=0, prepend=line[:1]), axis=1))
+    keep = np.diff(np.floor(sailed / step), prepend=-1.0) > 0
+    keep[-1] = True
+    return line[keep]
 
 
 def _runs(piece: NDArray[np.float64], valid: NDArray[np.bool_]) -> list[NDArray[np.float64]]:
