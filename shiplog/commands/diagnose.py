@@ -251,7 +251,7 @@ def _save(
     done.folder.mkdir(parents=True, exist_ok=True)
     files.write_text(done.markdown, page.written(done.verdict))
     files.write_json(done.folder / VERDICT, done.verdict.as_json())
-    for name in (RECORDING, PAGE):
+    for name in (RECORDING, PAGE, sources.GATE):
         files.remove(done.folder / name)
     portable_places = {key: portable([str(path)])[0] for key, path in places.items()}
     facts = provenance(hashes, began) | portable_places

@@ -20,6 +20,7 @@ from shiplog.report.gate import diagnosed, diagnosis_folder, golden, judging, ju
 from shiplog.report.gate.diagnosed import Diagnosed
 from shiplog.report.gate.gate import Gate
 from shiplog.report.gate.limits_file import Limits
+from shiplog.report.page.diagnosis.source import GATE
 from shiplog.report.result import Answer
 from shiplog.training.runs import load_model
 from shiplog.training.runs.load_model import Run
@@ -104,7 +105,7 @@ def gate_run(
     verdict = of.diagnosed() if limits.of_verdict else None
     if verdict is not None:
         outcomes += judging.of_verdict(limits, verdict, of.own, of.windless)
-    return Gate(
+    done = Gate(
         of.run.name,
         of.run.profile.ship.name,
         str(limits_path),
@@ -116,6 +117,9 @@ def gate_run(
         "" if verdict is None else verdict.sentence,
         str(of.folder) if verdict is not None and of.folder else "",
     )
+    if verdict is not None and of.folder:  # for the page of that verdict
+        files.write_json(of.folder / GATE, done.json | {"limits_file": limits_path.name})
+    return done
 
 
 def gate_command(

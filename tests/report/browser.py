@@ -47,6 +47,10 @@ class Browser:
             time.sleep(0.2)
         return found
 
+    def devtools(self, command, **parameters):
+        body = {"cmd": command, "params": parameters}
+        return _call("POST", f"{self._session}/goog/cdp/execute", body)
+
     def picture(self, path):
         path.write_bytes(base64.b64decode(_call("GET", f"{self._session}/screenshot")))
 

@@ -204,3 +204,19 @@ def test_text_is_escaped_and_code_is_code():
     assert "<b>k" not in text and "<i>" not in text and "<u>" not in text and "<c>" not in text
     assert '<code>b&lt;c&gt;</code> d <data value="0.5">&lt;50%&gt;</data>' in text
     assert "an odd ` stays" in text
+
+
+def test_limits_of_the_user_stand_next_to_the_prediction(tmp_path):
+    folder = page_content.folder(tmp_path / "d")
+    assert "No limit was declared" in html.render(page.of_folder(folder))
+    one = {"name": "speed of current", "expected": "at most 0.03 m/s", "found": "0.11 m/s",
+           "reason": "", "outcome": "broken"}  # fmt: skip
+    other = {"name": "end position", "expected": "at most 4 m", "found": "",
+             "reason": "no window was simulated", "outcome": "not assessed"}  # fmt: skip
+    gate = {"limits": [one, other], "limits_file": "<limits>.toml", "sentence": "2 of 2 broken."}
+    (folder / "gate.json").write_text(json.dumps(gate), encoding="utf-8")
+    text = html.render(page.of_folder(folder))
+    said = "".join(read(text).text)
+    assert "Against <limits>.toml: 2 of 2 broken." in said and "<limits>" not in text
+    for word in ("at most 0.03 m/s", "broken", "no window was simulated", "not assessed"):
+        assert word in said

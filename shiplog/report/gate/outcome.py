@@ -90,6 +90,7 @@ class Outcome:
             "limit": list(self.limit) if isinstance(self.limit, tuple) else self.limit,
             "unit": self.unit, "measured": m.value, "low": m.low, "high": m.high,
             "words": m.words, "outcome": self.state, "reason": m.reason,
+            "expected": self.expected, "found": self.found,
         }  # fmt: skip
 
 

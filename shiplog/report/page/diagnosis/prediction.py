@@ -30,8 +30,19 @@ def blocks(source: Source) -> list[Block]:
         found.append(Gallery(drawn))
     if not found:
         return [Paragraph(["No prediction was assessed: there is no window to simulate."])]
-    found.append(Paragraph([
-        "No limit was declared here. `shiplog gate` holds these figures against limits of yours, "
-        "in metres, degrees and sizes of causes.",
-    ]))  # fmt: skip
-    return found
+    return found + _limits(source)
+
+
+def _limits(source: Source) -> list[Block]:
+    """Each declared limit with what became of it."""
+    if source.gate is None:
+        return [Paragraph([
+            "No limit was declared. `shiplog gate RUN --limits FILE --diagnosis FOLDER` holds these "
+            "figures against limits of yours, in metres, degrees and sizes of causes.",
+        ])]  # fmt: skip
+    rows = [
+        ([one["name"]], [one["expected"]], [one["found"] or one["reason"]], [one["outcome"]])
+        for one in source.gate["limits"]
+    ]
+    said = Paragraph([f"Against {source.gate['limits_file']}: {source.gate['sentence']}"])
+    return [said, Grid(("limit", "asked", "measured", "outcome"), rows)]

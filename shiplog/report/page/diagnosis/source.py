@@ -14,15 +14,17 @@ from shiplog.report.figures import picture_data, pictures, style
 from shiplog.report.figures.content import Content
 from shiplog.report.page.blocks import Drawn
 
-VERDICT, PROVENANCE = "verdict.json", "provenance.json"
+VERDICT, PROVENANCE, GATE = "verdict.json", "provenance.json", "gate.json"
 
 
 @dataclass(frozen=True)
 class Source:
-    """A verdict, the tables of its pictures, and where it comes from."""
+    """A verdict, the tables of its pictures, where it comes from, and what the gate said of it;
+    None where it was not asked."""
 
     content: Content
     provenance: Mapping[str, Any]
+    gate: Mapping[str, Any] | None = None
 
     @property
     def verdict(self) -> Mapping[str, Any]:
@@ -78,7 +80,8 @@ def read(folder: Path) -> Source:
     except ShiplogError:
         provenance = {}
     data = picture_data.load(folder / picture_data.FOLDER)
-    return Source(Content(verdict, data), provenance)
+    gate = _json(folder / GATE) if (folder / GATE).is_file() else None
+    return Source(Content(verdict, data), provenance, gate)
 
 
 def _json(path: Path) -> dict:
