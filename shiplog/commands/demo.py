@@ -16,6 +16,7 @@ from shiplog.commands.train_networks import train_run
 from shiplog.exceptions import listed
 from shiplog.machine.paths import refuse_no_season, refuse_none_ingested, sample_logs
 from shiplog.report import viewer
+from shiplog.report.diagnosis.diagnosis import PAGE
 from shiplog.report.evaluation import tables
 from shiplog.report.result import Printed
 from shiplog.training.runs import run_folder
@@ -94,12 +95,15 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
         drawn = drawn and again.drawn
     season = compare_runs(both, store, [NEXT_SEASON], out / "season2.rrd")
     took = time.monotonic() - began
+    page = out / "diagnosis" / PAGE
+    where = f"The page to look at first, and to mail: {page}" if page.is_file() else "No page."
     ending = (
         f"\nHalf a year later ({NEXT_SEASON}), the same ship:\n\n"
         f"{diagnosis.verdict.sentence}\n\nThe extended model, diagnosed again: {repeated}\n\n"
         f"Took {took:.0f} s. The voyages are in {store.path}, the runs in {out / 'runs'}, the "
         f"diagnosis in {out / 'diagnosis' / 'report.md'}.\n"
-        f"Look at it again: {viewer.RERUN} {result.written()} {season.written()}\n"
+        f"{where}\n"
+        f"Look at the voyages again: {viewer.RERUN} {result.written()} {season.written()}\n"
         "The store has two more seasons, season3_* and season4_*: "
         f"shiplog diagnose {path} --voyages 'season3_*' --store {store.path}"
     )

@@ -355,6 +355,6 @@ def test_a_diagnosis_of_too_little_replaces_an_earlier_one_and_extends_nothing(
     judge([*desk.on("diagnose", "mmg"), "--out", out, "--extend", desk.path("r")], 0,
           ["Too little"], capsys)  # fmt: skip
     assert sorted(p.name for p in out.iterdir()) == [
-        "provenance.json", "report.md", "verdict.json",
+        "pictures", "provenance.json", "report.html", "report.md", "verdict.json",
     ]  # fmt: skip
     assert f"{desk.path('r')} is not written" in caplog.text and not desk.path("r").exists()

@@ -31,7 +31,7 @@ def pictures(monkeypatch, tmp_path):
             done.append("pictures")
             raise fault
 
-        monkeypatch.setattr(pipeline.diagnosis_pictures, "save", drawn)
+        monkeypatch.setattr(pipeline.diagnosis_pictures, "exhibit", drawn)
         return done
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))

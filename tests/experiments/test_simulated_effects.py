@@ -38,6 +38,8 @@ INSTRUMENTS = [
     (Effects(wind_direction_offset=math.radians(9)), {"/wind/apparent": "direction_deg"}, 9.0),
 ]
 
+pytestmark = pytest.mark.long  # simulated ships of the experiments; the product has its own tests
+
 
 @pytest.mark.parametrize("effects", FORCES, ids=str)
 def test_each_hidden_force_moves_the_ship_and_no_instrument(effects):

@@ -23,6 +23,8 @@ from pipelines.experiments.simulated_ship.sample_logs import PLANS, SEASONS
 from pipelines.experiments.simulated_ship.sensors import DATUM, Blemishes
 from pipelines.experiments.simulated_ship.ship import ANTENNA
 
+pytestmark = pytest.mark.long  # simulated ships of the experiments; the product has its own tests
+
 
 def test_the_instruments_err_as_much_as_they_say(tmp_path):
     voyage = sail(1000.0, seed=21, wind=Wind(3.0, 2.0))

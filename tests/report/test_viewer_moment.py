@@ -10,6 +10,7 @@ from PIL import Image
 from recordings import SECONDS, rows, scalars, views
 
 from shiplog.exceptions import ShiplogError
+from shiplog.machine import child
 from shiplog.report import colours, viewer
 from shiplog.report.viewer import control, display, native, recording, saving, still, timeline
 from shiplog.report.viewer.comparison_data import Moment
@@ -100,12 +101,12 @@ def test_a_viewer_that_was_opened_is_told_where_to_stand(at_60, tmp_path, no_vie
         try:
             native.wait_for(process, (port,), control.LOAD_TIMEOUT_S)
         except TimeoutError:
-            no_viewer(f"no headless viewer here: {native.last_words(output)}")
+            no_viewer(f"no headless viewer here: {child.last_words(output)}")
         try:
             native._put_cursor(port, 60.0)
             state = ViewerClient(control.address(native.HOST, port)).get_state()
         finally:
-            native.stop(process)
+            child.stop(process)
     assert [r.current_time for r in state.recordings if r.timelines] == [60 * 10**9]
 
 

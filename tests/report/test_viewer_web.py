@@ -98,6 +98,7 @@ def test_the_cursor_is_asked_for_as_rerun_asks_for_it():
     assert bytes(web_page.cursor_at("sim_time", 300.0)) == sent
 
 
+@pytest.mark.long
 @pytest.mark.viewer
 def test_a_real_browser_shows_the_recording_and_asks_no_other_host(served, tmp_path):
     """By the browser's own log; a page without a policy shows that the log would have it."""
