@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from shiplog.cli import completion
 from shiplog.cli.inputs import check_runs
 from shiplog.cli.options import STORE, Causes, JsonOption, StoreOption
 from shiplog.cli.output import answer
@@ -15,13 +16,17 @@ BROKEN = 4  # exit code: a limit is broken
 
 
 def gate(
-    run: Annotated[Path, typer.Argument(help="A trained run, such as runs/mmg.")],
+    run: Annotated[
+        Path,
+        typer.Argument(help="A trained run, such as runs/mmg.", autocompletion=completion.runs),
+    ],
     limits: Annotated[Path, typer.Option(help="TOML file of limits; --write makes one.")],
     voyages: Annotated[
         list[str] | None,
         typer.Option(
             help="Names or shell patterns, several times; unless given, those of the diagnosis, "
-            "else the run's test voyages, else all that it was not fitted to."
+            "else the run's test voyages, else all that it was not fitted to.",
+            autocompletion=completion.voyages,
         ),
     ] = None,
     store: StoreOption = STORE,
