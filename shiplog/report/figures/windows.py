@@ -43,7 +43,9 @@ def _few(rows: pl.DataFrame) -> pl.DataFrame:
 
 
 def draw(axes: Axes, rows: pl.DataFrame, content: Content) -> None:
-    ends = rows.group_by("place").agg(low=pl.col("loss").min(), high=pl.col("loss").max())
+    ends = rows.group_by("place", maintain_order=True).agg(
+        low=pl.col("loss").min(), high=pl.col("loss").max()
+    )
     axes.vlines(
         ends["place"].to_numpy(), ends["low"].to_numpy(), ends["high"].to_numpy(),
         color=colours.web(colours.GRID), linewidth=1.5, zorder=1,
