@@ -40,8 +40,9 @@ JUDGEMENTS: dict[str, str] = {
         "else."
     ),
     "usv_fuzhou": (
-        "Believable. Two runs of 126 and 210 s at 2 Hz, one of them full of gaps, are too little "
-        "for a verdict."
+        "Believable as far as it goes. Position and velocity of the zigzag disagree by 8 deg, and "
+        "these data cannot tell which of them is right. Two runs of 126 and 210 s at 2 Hz, one of "
+        "them full of gaps, would be too little for a verdict in any case."
     ),
     "qixing": (
         "Believable. What drives the ship is not in the data. `ingest` says that the velocity "
@@ -61,5 +62,5 @@ JUDGEMENTS: dict[str, str] = {
         "Right. The log holds a position and a sensor, and no vehicle that is steered."
     ),
     "mcap, battery": ("Right. The log holds the position, speed and battery of a car."),
-    "mcap, AIS": ("Right. Four seconds of AIS hold one or two reports of a ship."),
+    "mcap, AIS": ("Right. Four seconds of AIS hold one or two reports of a ship, and no actuator."),
 }

@@ -7,7 +7,7 @@ from shiplog.report.page.blocks import Block, Command, Fold, Gallery, Paragraph
 from shiplog.report.page.diagnosis.source import Source
 
 FIRST = ("closeup", "position_error", "heading_error", "channels")
-MOST_TRACKS = 12  # voyages with a chart of their own on the page
+MOST_TRACKS = 6  # voyages with a chart of their own on the page
 
 
 def blocks(source: Source) -> list[Block]:
@@ -23,7 +23,8 @@ def blocks(source: Source) -> list[Block]:
     names = source.content.data.names
     tracks = [one for name in names[:MOST_TRACKS] if (one := source.drawn("track", name))]
     if tracks:
-        found.append(Fold("Tracks of every voyage", [Gallery(tracks)]))
+        title = "Tracks of every voyage" if len(names) <= MOST_TRACKS else "Tracks of six voyages"
+        found.append(Fold(title, [Gallery(tracks)]))
     return found
 
 
