@@ -94,3 +94,24 @@ def test_the_pages_of_the_documentation_have_the_judgements():
         assert text.startswith(f"# {title}\n") and page.MARKED.search(text)
         for one in names:
             assert page._filled(page.JUDGEMENTS[one]) in text
+
+
+def test_a_step_that_was_killed_is_done_again(tmp_path, monkeypatch):
+    """As by its limit of time, on a machine that had other work."""
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "run.mcap").write_text("log")
+    done, code = [], -9
+
+    def step(what, command, folder, settings):
+        if "--json" in command:
+            Path(command[-1]).write_text(json.dumps({}))
+        done.append(what)
+        return {"step": what, "rc": code if what == "ingest" else 0, "cpu_s": 1.0, "stderr": ""}
+
+    monkeypatch.setattr(way, "step", step)
+    one = DataSet("a ship", "data", logs=("*.mcap",), profile="kvlcc2")
+    way.go("a ship", one, tmp_path, tmp_path / "out")
+    assert done == ["ingest"]
+    code = 0
+    way.go("a ship", one, tmp_path, tmp_path / "out")
+    assert done == ["ingest", "ingest", "voyages", "train", "evaluate", "diagnose"]

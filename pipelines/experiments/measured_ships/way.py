@@ -47,7 +47,7 @@ def go(name: str, one: DataSet, data: Path, out: Path) -> Way:
     known = folder / "steps.json"
     before = {s["step"]: s for s in json.loads(known.read_text("utf-8"))} if known.exists() else {}
     for what, arguments in _commands(one, data / one.folder, folder):
-        if what in before:
+        if what in before and before[what]["rc"] >= 0:  # one that was killed did not end
             done.append(before[what])
         else:
             log.info("%s: %s", name, what)
