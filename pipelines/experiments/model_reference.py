@@ -13,7 +13,7 @@ import numpy as np
 from shiplog.models.causes import CATALOGUE
 from shiplog.models.causes.base import Cause, Parameter
 from shiplog.models.causes.environment import ShallowWater
-from shiplog.models.causes.ship import RudderOffset
+from shiplog.models.causes.steering import RudderOffset
 from shiplog.models.coefficients import ParameterEntry
 from shiplog.models.mmg.parameters import TABLE
 from shiplog.report.evaluation import tables

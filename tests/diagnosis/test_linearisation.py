@@ -9,7 +9,7 @@ from toy_ship import DAMP, GRID, RECORD, ROWS, SETTING, THETA, TURN, Coasting, T
 from shiplog.diagnosis.linear import linearisation, measurement_correction, segments
 from shiplog.diagnosis.linear.linear_segments import Path
 from shiplog.models.causes.sensors import AntennaOffset, HeadingOffset
-from shiplog.models.causes.ship import RudderDelay, RudderLag
+from shiplog.models.causes.steering import RudderDelay, RudderLag
 from shiplog.voyages.rows.recording import Record
 
 

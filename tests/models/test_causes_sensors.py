@@ -7,7 +7,7 @@ from cause_ships import BY, SHIPS, SINGLE, TWIN, setting, sized
 from test_causes import CHANGED
 
 from shiplog.models.causes import CATALOGUE
-from shiplog.models.causes.ship import RudderDelay, RudderLag, RudderOffset
+from shiplog.models.causes.steering import RudderDelay, RudderLag, RudderOffset
 from shiplog.voyages.rows.recording import Record
 
 # --- sensors: the test bends them by hand ---------------------------------------------------------

@@ -8,7 +8,8 @@ import pytest
 from shiplog.diagnosis.trial.fitted import ExpectedEvidence
 from shiplog.models.causes.environment import Bank, Current, WindForce
 from shiplog.models.causes.sensors import HeadingOffset
-from shiplog.models.causes.ship import Fouling, RudderDelay, RudderLag
+from shiplog.models.causes.ship import Fouling
+from shiplog.models.causes.steering import RudderDelay, RudderLag
 from shiplog.report.diagnosis import answer, page
 from shiplog.report.diagnosis.sections import causes as named_causes
 from shiplog.report.diagnosis.sections import limits as smallest

@@ -10,7 +10,7 @@ import polars as pl
 import pytest
 
 from shiplog.models import mmg
-from shiplog.models.causes.ship import RudderDelay, RudderLag
+from shiplog.models.causes.steering import RudderDelay, RudderLag
 from shiplog.models.extended import Extended
 from shiplog.nomenclature import frames
 from shiplog.ship_profile import file as profiles

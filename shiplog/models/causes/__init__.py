@@ -27,13 +27,11 @@ from shiplog.models.causes.ship import (
     CrossFlowDrag,
     Fouling,
     Payload,
-    RudderDelay,
     RudderForce,
-    RudderLag,
-    RudderOffset,
     ThrustDrift,
     ThrustLoss,
 )
+from shiplog.models.causes.steering import RudderDelay, RudderLag, RudderOffset
 
 CATALOGUE: tuple[Cause, ...] = (
     Current(), WindForce(), ShallowWater(), Bank(),
