@@ -30,8 +30,8 @@ if TYPE_CHECKING:
         sensors,
         train,
     )
+    from shiplog.commands.compare import Comparison
     from shiplog.commands.convert import Converted, Draft
-    from shiplog.commands.evaluate import Comparison
     from shiplog.commands.gate import Gate
     from shiplog.commands.prepare import Ingested
     from shiplog.commands.sensors import SensorComparison
@@ -74,7 +74,7 @@ __all__ = [
 
 # Where a class is defined; functions are in `commands/api.py`.
 _CLASSES = {
-    "Comparison": "commands.evaluate",
+    "Comparison": "commands.compare",
     "Converted": "commands.convert",
     "Diagnosis": "report.diagnosis.diagnosis",
     "Draft": "commands.convert",

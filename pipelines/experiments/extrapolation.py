@@ -22,8 +22,9 @@ from pathlib import Path
 import polars as pl
 
 from pipelines.experiments.esso_osaka import TWIN, published_split, trials_store
+from shiplog.commands.compare import comparison
 from shiplog.commands.demo import sample_logs
-from shiplog.commands.evaluate import comparison, evaluate_runs
+from shiplog.commands.evaluate import evaluate_runs
 from shiplog.commands.identify import identify_run
 from shiplog.commands.prepare import ingest_logs
 from shiplog.commands.train_networks import train_run

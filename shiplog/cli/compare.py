@@ -72,7 +72,8 @@ def compare(
     from shiplog.commands.bars import loading
 
     with loading():
-        from shiplog.commands.evaluate import compare_runs, keep_pages
+        from shiplog.commands.compare import compare_runs
+        from shiplog.commands.evaluate import keep_pages
     from shiplog.voyages.store.store import Store
 
     result = compare_runs(runs, Store(store), voyages or [], to, cause or [], at)

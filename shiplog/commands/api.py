@@ -17,8 +17,8 @@ from shiplog.voyages.store.store import Store
 from shiplog.voyages.store.voyage import Voyage
 
 if TYPE_CHECKING:
+    from shiplog.commands.compare import Comparison
     from shiplog.commands.convert import Converted, Draft
-    from shiplog.commands.evaluate import Comparison
     from shiplog.commands.gate import Gate
     from shiplog.commands.prepare import Ingested
     from shiplog.commands.sensors import SensorComparison
@@ -230,10 +230,10 @@ def compare(
 ) -> Comparison:
     """The same as a Rerun recording: `save`, or compare.rrd in the first run. `save` may also be
     a .png, .svg or .html. `at`: "VOYAGE:SECONDS" that it is opened at. Raises ShiplogError."""
-    from shiplog.commands import evaluate as evaluating
+    from shiplog.commands import compare as comparing
 
     to = None if save is None else Path(save)
-    done = evaluating.compare_runs(
+    done = comparing.compare_runs(
         _runs(runs), Store(_path(store)), _names(voyages), to, _files(causes), at
     )
     done.written()

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from shiplog.commands.compare import compare_runs
 from shiplog.commands.diagnose import diagnose_run
-from shiplog.commands.evaluate import compare_runs
 from shiplog.commands.identify import identify_run
 from shiplog.commands.prepare import ingest_logs
 from shiplog.commands.train_networks import train_run
