@@ -11,10 +11,12 @@ import pytest
 
 from shiplog.exceptions import ShiplogError
 from shiplog.models.causes import CATALOGUE
+from shiplog.report.diagnosis.sections import subject
 from shiplog.report.figures.bars import spoken
+from shiplog.report.figures.content import Content
 from shiplog.report.page import html, results
 from shiplog.report.page.blocks import Number, Page, Paragraph, Section
-from shiplog.report.page.diagnosis import considered, page, source
+from shiplog.report.page.diagnosis import answer, considered, page, source
 
 VERDICTS = ("named", "none", "undecided", "unknown", "coverage", "external")
 
@@ -152,6 +154,51 @@ def test_what_became_of_every_cause_of_the_catalogue():
     assert state["clock offset (gnss)"] == considered.EXCLUDED
     assert state["clock offset (wind)"] == considered.ABSENT
     assert rows["wind force"][1] == ["would show from 140 %"]
+
+
+def test_a_candidate_of_an_undecided_verdict_is_not_excluded():
+    half = [{"name": "wind_force", "probability": 0.5}, {"name": "payload", "probability": 0.45},
+            {"name": "fouling", "probability": 0.05}]  # fmt: skip
+    verdict = page_content.verdict("undecided", ranking=half)
+    state = {name: state for name, state, _ in considered.table(verdict)}
+    assert state["wind force"] == state["payload"] == considered.OPEN
+    assert state["fouling"] == considered.EXCLUDED
+
+
+def cards(verdict):
+    """Question → its answer, of the first screen."""
+    content = Content(verdict, page_content.pictures())
+    pairs = answer.blocks(source.Source(content, {}))[0].pairs
+    said = {ask: [p if isinstance(p, str) else p.text for line in lines for p in line]
+            for ask, lines in pairs}  # fmt: skip
+    return {ask: "".join(parts) for ask, parts in said.items()}
+
+
+def test_what_to_do_speaks_of_a_test_only_where_there_is_one():
+    do = "What do I do?"
+    assert "test below" not in cards(page_content.verdict("undecided"))[do]
+    note = "A test that separates them: a turning circle."
+    assert "test below" in cards(page_content.verdict("undecided", notes=[note]))[do]
+
+
+def test_what_acts_beside_a_named_cause_is_said_on_the_first_screen():
+    ranking = [{"name": "unknown:heading", "probability": 1.0},
+               {"name": "current", "probability": 0.97}]  # fmt: skip
+    found = cards(page_content.verdict(ranking=ranking))
+    assert "outside the catalogue (heading)" in found["What is wrong?"]
+    assert "Expect the rest" in found["What do I do?"]
+    assert "outside" not in cards(page_content.verdict())["What is wrong?"]
+
+
+def test_a_channel_that_was_not_testable_is_not_the_whole_cause():
+    gnss = [{"name": "heading_offset", "reason": "gnss: the velocity is recorded over ground"}]
+    missed = cards(page_content.verdict(unavailable=gnss))["What would have been missed?"]
+    assert "Not testable here: heading offset (gnss)." in missed
+
+
+def test_a_recorder_without_a_date_has_none():
+    assert subject.begin("1970-01-01T00:45:00+00:00") == "without a date"
+    assert subject.begin("2026-04-14T02:00:00+00:00") == "2026-04-14 02:00"
 
 
 def test_a_finding_opens_the_recording_at_its_moment(tmp_path):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import polars as pl
 
+from shiplog.nomenclature.numbers import figure
 from shiplog.report import colours
 from shiplog.report.figures import hull, style
 from shiplog.report.figures.content import Content, Picture
@@ -283,18 +284,18 @@ def _ends(table: pl.DataFrame, data: PictureData) -> str:
         if key in last and len(last[key]) and len(last.get(MEASURED, ())):
             off = math.hypot(*(last[key][k][0] - last[MEASURED][k][0] for k in ("x0", "y0")))
             found.append(
-                f"At its end {data.models.get(key, key)} is {off:.1f} m ({off / data.length:.1f} "
-                "ship lengths) from where the ship was"
+                f"At its end {data.models.get(key, key)} is {figure(off, 3)} m "
+                f"({figure(off / data.length)} ship lengths) from where the ship was"
             )
     return " ".join(f"{one}." for one in found)
 
 
 def voyage_words(table: pl.DataFrame, content: Content) -> str:
     names = ", ".join(label for _, label, _ in legend(content.data))
-    return (
-        f"Chart of {table['voyage'][0]}, north up, tracks: {names}. Every simulated track begins "
-        "at the measured state, at a dot."
-    )
+    found = f"Chart of {table['voyage'][0]}, north up, tracks: {names}."
+    if not content.data.models:
+        return found
+    return f"{found} Every simulated track begins at the measured state, at a dot."
 
 
 CLOSEUP = Picture(

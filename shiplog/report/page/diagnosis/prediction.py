@@ -37,8 +37,8 @@ def _limits(source: Source) -> list[Block]:
     """Each declared limit with what became of it."""
     if source.gate is None:
         return [Paragraph([
-            "No limit was declared. `shiplog gate RUN --limits FILE --diagnosis FOLDER` holds these "
-            "figures against limits of yours, in metres, degrees and sizes of causes.",
+            "No limit was declared. `shiplog gate RUN --limits FILE --diagnosis FOLDER` holds "
+            "these figures against limits of yours, in metres, degrees and sizes of causes.",
         ])]  # fmt: skip
     rows = [
         ([one["name"]], [one["expected"]], [one["found"] or one["reason"]], [one["outcome"]])

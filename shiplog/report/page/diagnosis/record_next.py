@@ -28,8 +28,9 @@ def blocks(source: Source) -> list[Block]:
               for one in uncovered[:2]]  # fmt: skip
     hidden = [one for one in verdict["limits"] if one["share"] > 1.0][:2]
     lines += [
-        [f"To see {spoken(one['name'])} below {size_in_words(one['parameters'])}: more of what it "
-         "acts in, and longer."]
+        [f"A smaller {spoken(one['name'], one.get('channel') or one.get('actuator'))} than "
+         f"{size_in_words(one['parameters'])} would not have shown: sail longer, and more in the "
+         "conditions in which it acts."]
         for one in hidden
     ]  # fmt: skip
     if not lines:
