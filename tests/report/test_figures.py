@@ -225,3 +225,8 @@ def test_directions_either_side_of_north_may_be_alike(name, spans, says):
         changes.SCHEMA, orient="row",
     )  # fmt: skip
     assert changes.verdict(rows, ["0", "1"]).startswith(says)
+
+
+def test_a_long_name_beside_the_axis_keeps_its_ends():
+    assert timeline.short("season2_1") == "season2_1"
+    assert timeline.short("random_06-Aug-2020_16_24_25_6") == "random_06…020_16_24_25_6"

@@ -13,7 +13,7 @@ from shiplog.nomenclature.numbers import figure
 from shiplog.report import colours
 from shiplog.report.figures.chart import legend
 from shiplog.report.figures.content import Content, Picture
-from shiplog.report.figures.picture_data import MEASURED
+from shiplog.report.figures.picture_data import BEFORE, MEASURED
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -71,7 +71,7 @@ def draw(axes: Axes, rows: pl.DataFrame, content: Content, of: str) -> None:
         elapsed, half = data.band["elapsed"].to_numpy(), data.band[of].to_numpy()
         half = np.degrees(half) if of == HEADING else half
         axes.fill_between(elapsed, half, color=colours.web(colours.GRID), linewidth=0, zorder=0,
-                          label="90 % band of the model itself")  # fmt: skip
+                          label=_band_label(content))  # fmt: skip
     for key, label, colour in legend(data):
         own = rows.filter(pl.col("model") == key)
         if key == MEASURED or own.is_empty():
@@ -93,6 +93,14 @@ def draw(axes: Axes, rows: pl.DataFrame, content: Content, of: str) -> None:
         )
         lengths.set_ylabel("ship lengths")
     axes.legend(loc="upper left")
+
+
+def _band_label(content: Content) -> str:
+    """Of several runs the band is that of the first."""
+    models = content.data.models
+    if len(models) < 2 or BEFORE in models:
+        return "90 % band of the model itself"
+    return f"90 % band that {next(iter(models.values()))} states"
 
 
 def _top(rows: pl.DataFrame) -> float:

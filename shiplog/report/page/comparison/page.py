@@ -55,9 +55,10 @@ def of_items(items: Sequence[Item]) -> Page:
     elif all(one.kind == "evaluation" for one in items):
         sections.append(Section("errors", "Errors", _errors(items)))
     names = listed((one.name for one in items), most=6)
+    ships = listed(dict.fromkeys(str(one.subject["ship"]) for one in items), most=3)
     return Page(
-        title=f"{first.subject['ship']}: {names}",
-        kicker=f"{first.subject['ship']} · {names} · shiplog {version('shiplog')}",
+        title=f"{ships}: {names}",
+        kicker=f"{ships} · {names} · shiplog {version('shiplog')}",
         word="unlike results" if unlike else "compared",
         tone="found" if unlike else tone,
         claim=claim,

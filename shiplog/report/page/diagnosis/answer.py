@@ -188,9 +188,10 @@ def missed(verdict: Mapping[str, Any]) -> list[Line]:
         found.append([said.replace(" %", "\u202f%")])  # never apart at the end of a line
     elif verdict["limits"]:
         found.append([f"At a realistic size, none of {len(verdict['limits'])} causes."])
-    untested = [name for name, state, _ in considered.table(verdict)
-                if state == considered.UNTESTABLE]  # fmt: skip
-    if untested:
+    became = [(name, state) for name, state, _ in considered.table(verdict)]
+    if absent := sum(state == considered.ABSENT for _, state in became):
+        found.append([f"Not assessed: {absent} of {len(became)} causes."])
+    if untested := [name for name, state in became if state == considered.UNTESTABLE]:
         text = ", ".join(untested[:MOST_MISSED])
         more = len(untested) - MOST_MISSED
         found.append([f"Not testable here: {text}{f', and {more} more' if more > 0 else ''}."])

@@ -6,6 +6,7 @@ from shiplog.report.figures.bars import size_in_words, spoken
 from shiplog.report.page.blocks import Block, Items, Line, Number, Paragraph, number
 from shiplog.report.page.diagnosis.source import Source
 
+ENDS = ("named", "none")  # verdicts that are an answer
 MOST = 6  # lines: more is no plan
 
 
@@ -34,6 +35,9 @@ def blocks(source: Source) -> list[Block]:
         for one in hidden
     ]  # fmt: skip
     if not lines:
+        if verdict["verdict"] not in ENDS:
+            return [Paragraph(["No manoeuvre is known that would decide it. More voyages, of "
+                               "other courses, speeds and winds, tell more."])]  # fmt: skip
         return [
             Paragraph(["Nothing is needed for this answer. More voyages find smaller changes."])
         ]

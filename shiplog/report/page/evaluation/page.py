@@ -46,12 +46,15 @@ def of_source(source: Source) -> Page:
     runs = list(source.answers)
     judged = source.answers[runs[0]]
     better = _beats(judged)
+    word = "better than its baselines" if better else "not better than every baseline"
+    if len(runs) > 1:
+        word = "compared"
     return Page(
         title=f"{subject['ship']}: evaluation of {listed(runs, most=3)}",
         kicker=f"{subject['ship']}, {subject['length_m']:g} m · {names} · {when} · "
         f"{listed(runs, most=4)} · shiplog {subject['shiplog']}",
-        word="better than its baselines" if better else "no better than its baselines",
-        tone="good" if better else "open",
+        word=word,
+        tone="good" if better and len(runs) == 1 else "open",
         claim=_claim(runs[0], judged, source),
         sections=[
             Section("answer", "The answer", _answer(source)),
@@ -73,6 +76,9 @@ def _claim(run: str, answer: Mapping[str, Any], source: Source) -> str:
     also = ""
     if lost := judged["diverged"]:
         held, also = f"{answer['windows'] - lost} of {held}", f"; {lost} diverged"
+    if len(source.answers) > 1:
+        each = "; ".join(_off(name, one) for name, one in source.answers.items())
+        return f"After {subject['window_s']} s, medians of {held} of {names} ({when}): {each}."
     lengths, degrees = judged["median_end_position_lengths"], judged["median_end_heading_deg"]
     if lengths is None or not math.isfinite(lengths):
         return f"On {held} of {names} ({when}), {run} diverges."
@@ -81,6 +87,17 @@ def _claim(run: str, answer: Mapping[str, Any], source: Source) -> str:
         f"{figure(degrees)} deg off, in the median of "
         f"{held} of {names} ({when}){also}."
     )
+
+
+def _off(run: str, answer: Mapping[str, Any]) -> str:
+    """How far off one of several runs is."""
+    judged = answer["judgement"]
+    lengths, lost = judged["median_end_position_lengths"], judged["diverged"]
+    if lengths is None or not math.isfinite(lengths):
+        return f"{run} diverges"
+    degrees = figure(judged["median_end_heading_deg"])
+    also = f", {lost} diverged" if lost else ""
+    return f"{run} {figure(lengths)} ship lengths and {degrees} deg off{also}"
 
 
 def gallery(content: Content, names: tuple[str, ...], voyage: str | None = None) -> list[Drawn]:
@@ -106,11 +123,11 @@ def _beats(answer: Mapping[str, Any]) -> bool:
 
 
 def _answer(source: Source) -> list[Block]:
-    answer = next(iter(source.answers.values()))
+    run, answer = next(iter(source.answers.items()))
     length, window = source.subject["length_m"], source.subject["window_s"]
     yaw_rate = answer["rmse"]["yaw_rate"]
     big: list[Line] = [
-        [f"After {window} s it is ", number(answer["end_position_m"], "m"), " (",
+        [f"After {window} s {run} is ", number(answer["end_position_m"], "m"), " (",
          figure(answer["end_position_m"] / length), " ship lengths) and ",
          number(answer["end_heading_deg"], "deg"), " off, in the mean."],
         ["Root mean square: surge ", number(answer["rmse"]["surge"], "m/s"), ", sway ",
@@ -120,10 +137,11 @@ def _answer(source: Source) -> list[Block]:
     ] if answer["end_position_m"] is not None else [[_diverged(answer)]]  # fmt: skip
     sure: list[Line] = [[number(answer["windows"]), f" windows of {window} s."]]
     if answer["band_90"]:
-        inside = min(answer["band_90"].values())
-        sure.append(["Its own 90 % band holds ", share(inside), " of the samples or more."])
+        inside = answer["band_90"].values()
+        sure.append([f"The 90 % band that {run} states holds ", _span(list(inside)),
+                     " of the samples of a channel."])  # fmt: skip
     else:
-        sure.append(["It states no band of its own."])
+        sure.append([f"{run} states no band of its own."])
     seen = [one["coverage"] for one in answer["voyages"].values() if one["coverage"] is not None]
     where: list[Line] = [
         ["Inside the training data: ", _span(seen), " of the seconds of a voyage."]
