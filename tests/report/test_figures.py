@@ -230,3 +230,15 @@ def test_directions_either_side_of_north_may_be_alike(name, spans, says):
 def test_a_long_name_beside_the_axis_keeps_its_ends():
     assert timeline.short("season2_1") == "season2_1"
     assert timeline.short("random_06-Aug-2020_16_24_25_6") == "random_06…020_16_24_25_6"
+
+
+def test_a_short_stretch_of_a_long_voyage_can_be_seen():
+    from matplotlib.figure import Figure
+
+    rows = pl.DataFrame(
+        [("long", "sailed", 0.0, 1e5), ("long", "external", 10.0, 30.0)],
+        timeline.SCHEMA, orient="row",
+    )  # fmt: skip
+    axes = Figure().add_subplot()
+    timeline.draw(axes, rows, Content(page_content.verdict(), page_content.pictures()))
+    assert [bar.get_width() for bar in axes.patches] == pytest.approx([1e5, 500.0])

@@ -188,9 +188,9 @@ def test_what_acts_beside_a_named_cause_is_said_on_the_first_screen():
     ranking = [{"name": "unknown:heading", "probability": 1.0},
                {"name": "current", "probability": 0.97}]  # fmt: skip
     found = cards(page_content.verdict(ranking=ranking))
-    assert "outside the catalogue (heading)" in found["What is wrong?"]
+    assert "no cause of the catalogue explains (heading)" in found["What is wrong?"]
     assert "Expect the rest" in found["What do I do?"]
-    assert "outside" not in cards(page_content.verdict())["What is wrong?"]
+    assert "Beside" not in cards(page_content.verdict())["What is wrong?"]
 
 
 def test_a_channel_that_was_not_testable_is_not_the_whole_cause():

@@ -22,6 +22,7 @@ MOST_HULLS = {"closeup": 10, "voyage": 24}  # on one track: more would hide the 
 # where the reader is to see how far off it ends.
 ROOM = {"closeup": 2.0, "voyage": 0.35}
 SHAPE = 1.15  # width of a chart over its height
+MARGIN = 0.12  # of the tracks, left free around them: the scale bar is below the lowest
 METRES_PER_DEGREE = 111_320.0  # of latitude, and of longitude at the equator
 MOST_WINDOWS = 100  # with a track on the chart of a voyage
 GAP_S = 2.5  # s between rows of a second each, from which a track is broken
@@ -167,7 +168,7 @@ def _limit(axes: Axes, table: pl.DataFrame, length: float, room: float) -> None:
         own = table
     ends = [_ends_of(own[name]) for name in ("y0", "x0")]
     size = max(high - low for low, high in ends)
-    margin = max(0.06 * size, 1.2 * length)
+    margin = max(MARGIN * size, 1.2 * length)
     spans = []
     for (low, high), name in zip(ends, ("y0", "x0"), strict=True):
         least, most = _ends_of(table[name])

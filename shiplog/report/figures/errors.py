@@ -84,7 +84,8 @@ def draw(axes: Axes, rows: pl.DataFrame, content: Content, of: str) -> None:
         axes.plot(elapsed, median, color=colour, linewidth=1.8, label=label)
     axes.set_xlabel("time since the start of the window [s]")
     axes.set_xlim(left=0.0)
-    axes.set_ylim(0.0, _top(rows))
+    top = _top(rows)
+    axes.set_ylim(0.0, min(top, 180.0) if of == HEADING else top)
     axes.set_ylabel("position error [m]" if of == POSITION else "heading error [deg]")
     if of == POSITION:
         lengths = axes.secondary_yaxis(

@@ -22,6 +22,7 @@ KINDS = {  # of an interval → its words and colour
 OTHERS = (colours.BLUE, colours.GREEN, colours.PURPLE, colours.TEXT, colours.SKY)  # of other kinds
 MOST_KINDS = 8  # in a legend
 LONGEST = 26  # letters of a name beside the axis: more would leave no room for the voyages
+SHORTEST = 0.005  # of the axis, that a stretch is drawn with: a shorter one could not be seen
 WHOLE = 0.95  # of a voyage: a finding of as much is one of the whole voyage
 SCHEMA = {
     "voyage": pl.String, "kind": pl.String, "start_s": pl.Float64, "end_s": pl.Float64,
@@ -54,13 +55,15 @@ def draw(axes: Axes, rows: pl.DataFrame, content: Content) -> None:
     seen: set[str] = set()
     kinds = [k for k in rows["kind"].unique(maintain_order=True) if k not in ("sailed", *KINDS)]
     others = {k: (k, OTHERS[i % len(OTHERS)]) for i, k in enumerate(kinds)}
+    least = SHORTEST * float(rows["end_s"].to_numpy().max())
     for voyage, kind, start, end in rows.iter_rows():
         if kind == "sailed":
             axes.barh(place[voyage], end, height=0.28, color=colours.web(colours.GRID))
             continue
         label, colour = (KINDS | others)[kind]
         axes.barh(
-            place[voyage], end - start, left=start, height=0.5, color=colours.web(colour),
+            place[voyage], max(end - start, least), left=start, height=0.5,
+            color=colours.web(colour),
             label=None if kind in seen or len(seen) >= MOST_KINDS else label,
         )  # fmt: skip
         seen.add(kind)

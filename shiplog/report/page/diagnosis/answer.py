@@ -103,16 +103,19 @@ def _what(verdict: Mapping[str, Any]) -> list[Line]:
     if verdict["causes"]:
         found: list[Line] = [[cause["sentence"]] for cause in verdict["causes"]]
         if (rest := _outside(verdict)) is not None:
-            found.append([f"Beside that something acts that no known cause explains: {rest}."])
+            found.append(
+                [f"Beside that, something acts that no cause of the catalogue explains{rest}."]
+            )
         return found
     return [[verdict["sentence"]]]
 
 
 def _outside(verdict: Mapping[str, Any]) -> str | None:
-    """What is sure to act beside the named causes and is none of the catalogue, in words."""
+    """What goes with something that is sure to act beside the named causes: " (heading)"."""
     for one in verdict["ranking"]:
         if one["name"].startswith("unknown") and one["probability"] >= STATED:
-            return spoken(one["name"])
+            family = one["name"].partition(":")[2].replace("_", " ")
+            return f" ({family})" if family else ""
     return None
 
 

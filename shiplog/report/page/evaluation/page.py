@@ -142,6 +142,9 @@ def _answer(source: Source) -> list[Block]:
                      " of the samples of a channel."])  # fmt: skip
     else:
         sure.append([f"{run} states no band of its own."])
+    if len(answer.get("seeds", ())) > 1:
+        sure.append([f"Numbers are means of {len(answer['seeds'])} seeds; the pictures show the "
+                     "seed whose error is the median."])  # fmt: skip
     seen = [one["coverage"] for one in answer["voyages"].values() if one["coverage"] is not None]
     where: list[Line] = [
         ["Inside the training data: ", _span(seen), " of the seconds of a voyage."]
@@ -150,7 +153,8 @@ def _answer(source: Source) -> list[Block]:
     ]  # fmt: skip
     return [
         Answers([
-            ("How good?", [[answer["sentence"]]]), ("How big are the errors?", big),
+            ("How good?", [[one["sentence"]] for one in source.answers.values()]),
+            ("How big are the errors?", big),
             ("How sure?", sure), ("Where is it worst?", where),
         ]),
         _models(source),
