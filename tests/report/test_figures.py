@@ -242,3 +242,14 @@ def test_a_short_stretch_of_a_long_voyage_can_be_seen():
     axes = Figure().add_subplot()
     timeline.draw(axes, rows, Content(page_content.verdict(), page_content.pictures()))
     assert [bar.get_width() for bar in axes.patches] == pytest.approx([1e5, 500.0])
+
+
+def test_the_scale_bar_is_below_the_lowest_track(content):
+    from matplotlib.figure import Figure
+
+    axes = Figure(figsize=(4.0, 3.7)).add_subplot()
+    far = Content(content.verdict, data_files.replace(content.data, length=0.5))
+    table = chart.closeup_table(far)
+    chart.draw_closeup(axes, table, far)
+    bars = [line.get_ydata() for line in axes.lines if line.get_linewidth() == 2.5]
+    assert max(bars[-1]) < table["x0"].min()
