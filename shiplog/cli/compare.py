@@ -53,7 +53,7 @@ def compare(
 ) -> None:
     """Measured against simulated in Rerun.
 
-    It opens the viewer, unless --save or --web is given.
+    It opens the viewer, unless --save, --report or --web is given.
 
     Example: shiplog compare runs/ref runs/d-ref --save compare.rrd
     """
@@ -79,7 +79,8 @@ def compare(
     result = compare_runs(runs, Store(store), voyages or [], to, cause or [], at)
     answer(result, json_to)
     lost = [*result.lost, *keep_pages(result.evaluation, Store(store), page)]
-    if save is None and result.recording is not None:
+    shown = web or (save is None and page is None)
+    if shown and result.recording is not None:
         try:
             show(result.recording, web, result.moment and result.moment.seconds)
         except ShiplogError as error:

@@ -16,9 +16,9 @@ def page_file(report: Path | None) -> Path | None:
     """Whether --report can be written is known before the work."""
     if report is None:
         return None
-    from shiplog.machine.paths import check_file
+    from shiplog.machine.paths import check_page
 
-    return check_file(report, "--report")
+    return check_page(report, "--report")
 
 
 def _ask_json(json_to: str | None) -> str | None:

@@ -38,10 +38,10 @@ def report(
 
     Example: shiplog report diagnosis --out september.html
     """
-    from shiplog.machine.paths import check_file, check_writable
+    from shiplog.machine.paths import check_page, check_writable
 
     if out is not None:
-        out = check_file(out, "--out")
+        out = check_page(out, "--out")
     if figures is not None:
         check_writable(figures, "--figures")
     from shiplog.commands.bars import loading

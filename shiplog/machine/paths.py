@@ -124,6 +124,22 @@ def check_file(path: Path, option: str, streams: bool = False) -> Path:
     return path
 
 
+NO_PAGE = frozenset({".pdf", ".png", ".svg", ".md", ".json", ".rrd"})  # endings of other files
+
+
+def check_page(path: Path, option: str) -> Path:
+    """As `check_file`, of a page: what ends as another kind of file would not open.
+
+    Raises ShiplogError.
+    """
+    if path.suffix.lower() in NO_PAGE:
+        raise ShiplogError(
+            f"{option} {path} ends in {path.suffix!r}, and the page is HTML.",
+            hint="end its name in .html; a browser prints it as PDF.",
+        )
+    return check_file(path, option)
+
+
 def check_run(path: Path) -> None:
     """Raises RunError for what is no finished run."""
     begun = path.name.endswith(BEGUN)

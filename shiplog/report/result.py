@@ -11,8 +11,9 @@ from html import escape
 from pathlib import Path
 from typing import Any, Protocol
 
+from shiplog.exceptions import ShiplogError
 from shiplog.machine import files
-from shiplog.machine.paths import check_file
+from shiplog.machine.paths import check_page
 from shiplog.report.evaluation.text_table import inert
 
 
@@ -74,8 +75,14 @@ class Shows(Printed):
     def report(self, path: str | Path) -> Path:
         """The page as a file, which needs nothing else. Raises ShiplogError where it cannot be
         written."""
-        to = check_file(Path(path), "the page")
-        files.write_text(to, self._shown.page())
+        to = check_page(Path(path), "the page")
+        try:
+            files.write_text(to, self._shown.page())
+        except OSError as error:
+            raise ShiplogError(
+                f"the page {to} could not be written: {error.strerror}.",
+                hint="give a file in a folder that can be written.",
+            ) from error
         return to
 
     def _repr_html_(self) -> str | None:

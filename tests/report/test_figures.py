@@ -7,7 +7,18 @@ import page_content
 import polars as pl
 import pytest
 
-from shiplog.report.figures import chart, errors, forces, hull, pictures, style, timeline, windows
+from shiplog.report.figures import (
+    changes,
+    chart,
+    conditions,
+    errors,
+    forces,
+    hull,
+    pictures,
+    style,
+    timeline,
+    windows,
+)
 from shiplog.report.figures import picture_data as data_files
 from shiplog.report.figures.content import Content
 from shiplog.report.figures.picture_data import AFTER, BEFORE, MEASURED
@@ -37,8 +48,8 @@ def test_heading_error_is_the_short_way_round():
 
 def test_words_say_the_numbers_of_the_picture(content):
     words = chart.closeup_words(chart.closeup_table(content), content)
-    assert "mmg is 9.9 m (2.0 ship lengths)" in words
-    assert "mmg, with it is 1.0 m (0.2 ship lengths)" in words
+    assert "mmg is 9.9 m (2 ship lengths)" in words
+    assert "mmg, with it is 0.99 m (0.2 ship lengths)" in words
     assert "mean 800 of mmg, 200 of mmg, with it" in windows.words(windows.table(content), content)
     force = forces.words(forces.table(content, "sway"), content, "sway")
     assert "root mean square 3 N" in force and "Without the force of current: 1 N" in force
@@ -156,3 +167,89 @@ def test_the_same_model_has_the_same_colour_in_every_picture(content):
         seen |= {to_hex(one.get_color()) for one in lines}
     assert seen == {colour}
     assert {key for key, *_ in chart.legend(content.data)} == {MEASURED, BEFORE, AFTER}
+
+
+def test_a_long_ship_is_not_said_to_be_nothing_off(content):
+    long = Content(content.verdict, data_files.replace(content.data, length=330.0))
+    assert "9.9 m (0.03 ship lengths)" in chart.closeup_words(chart.closeup_table(long), long)
+
+
+def test_an_error_of_a_hundred_degrees_is_written_out():
+    data = page_content.pictures()
+    turned = pl.when(pl.col("model") == BEFORE).then(math.radians(150.0)).otherwise(0.0)
+    data = data_files.replace(data, tracks=data.tracks.with_columns(heading=turned))
+    content = Content(page_content.verdict(), data)
+    words = errors.words(errors.table(content, errors.HEADING), content, errors.HEADING)
+    assert "mmg is 150 deg off (150 to 150)" in words
+
+
+def test_the_axis_holds_nine_in_ten_windows_unless_a_model_diverges():
+    rows = pl.DataFrame({"median": [2.2], "high": [18.0]})
+    assert 18.0 < errors._top(rows) < 36.0
+    assert errors._top(rows.with_columns(high=pl.lit(1e6))) < 40.0
+
+
+def test_names_under_the_axis_do_not_overlap():
+    names = ["00000220", "00000228", "00000235"]
+    assert windows.ticks([0, 9], ["season2_1", "season2_2"], 18)[2]
+    assert windows.ticks([0, 8, 10], names, 25) == ([0, 8, 10], names, False)
+    assert windows.ticks([0, 40, 41], names, 100) == ([0, 40], names[:2], False)
+
+
+def test_no_drift_angle_is_beyond_half_a_turn():
+    data = page_content.pictures()
+    astern = pl.Series("drift", [-math.pi, math.pi, 0.0])
+    data = data_files.replace(data, conditions=data.conditions.with_columns(astern))
+    cells = conditions.drift_table(Content(page_content.verdict(), data))["drift_deg"].abs()
+    assert 160.0 < cells.to_numpy().max() < 180.0
+
+
+def test_what_was_not_simulated_is_not_said_to_be():
+    data = data_files.replace(page_content.pictures(), models={})
+    content = Content(page_content.verdict(), data)
+    words = chart.voyage_words(chart.voyage_table(content), content)
+    assert "north up" in words and "simulated" not in words
+
+
+@pytest.mark.parametrize(
+    ("name", "spans", "says"),
+    [
+        ("direction", [(355.0, 364.0), (2.0, 6.0)], "no"),
+        ("direction", [(350.0, 358.0), (2.0, 6.0)], "yes"),
+        ("angle", [(355.0, 364.0), (2.0, 6.0)], "yes"),
+    ],
+)
+def test_directions_either_side_of_north_may_be_alike(name, spans, says):
+    rows = pl.DataFrame(
+        [(str(i), "current", name, "deg", sum(s) / 2, *s) for i, s in enumerate(spans)],
+        changes.SCHEMA, orient="row",
+    )  # fmt: skip
+    assert changes.verdict(rows, ["0", "1"]).startswith(says)
+
+
+def test_a_long_name_beside_the_axis_keeps_its_ends():
+    assert timeline.short("season2_1") == "season2_1"
+    assert timeline.short("random_06-Aug-2020_16_24_25_6") == "random_06…020_16_24_25_6"
+
+
+def test_a_short_stretch_of_a_long_voyage_can_be_seen():
+    from matplotlib.figure import Figure
+
+    rows = pl.DataFrame(
+        [("long", "sailed", 0.0, 1e5), ("long", "external", 10.0, 30.0)],
+        timeline.SCHEMA, orient="row",
+    )  # fmt: skip
+    axes = Figure().add_subplot()
+    timeline.draw(axes, rows, Content(page_content.verdict(), page_content.pictures()))
+    assert [bar.get_width() for bar in axes.patches] == pytest.approx([1e5, 500.0])
+
+
+def test_the_scale_bar_is_below_the_lowest_track(content):
+    from matplotlib.figure import Figure
+
+    axes = Figure(figsize=(4.0, 3.7)).add_subplot()
+    far = Content(content.verdict, data_files.replace(content.data, length=0.5))
+    table = chart.closeup_table(far)
+    chart.draw_closeup(axes, table, far)
+    bars = [line.get_ydata() for line in axes.lines if line.get_linewidth() == 2.5]
+    assert max(bars[-1]) < table["x0"].min()

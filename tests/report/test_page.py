@@ -10,11 +10,16 @@ import page_content
 import pytest
 
 from shiplog.exceptions import ShiplogError
+from shiplog.machine import paths
 from shiplog.models.causes import CATALOGUE
+from shiplog.report.diagnosis.sections import subject
 from shiplog.report.figures.bars import spoken
+from shiplog.report.figures.content import Content
 from shiplog.report.page import html, results
 from shiplog.report.page.blocks import Number, Page, Paragraph, Section
-from shiplog.report.page.diagnosis import considered, page, source
+from shiplog.report.page.diagnosis import answer, considered, page, record_next, source
+from shiplog.report.page.evaluation import page as evaluation_page
+from shiplog.report.page.evaluation import source as evaluation_source
 
 VERDICTS = ("named", "none", "undecided", "unknown", "coverage", "external")
 
@@ -154,6 +159,104 @@ def test_what_became_of_every_cause_of_the_catalogue():
     assert rows["wind force"][1] == ["would show from 140 %"]
 
 
+def test_a_candidate_of_an_undecided_verdict_is_not_excluded():
+    half = [{"name": "wind_force", "probability": 0.5}, {"name": "payload", "probability": 0.45},
+            {"name": "fouling", "probability": 0.05}]  # fmt: skip
+    verdict = page_content.verdict("undecided", ranking=half)
+    state = {name: state for name, state, _ in considered.table(verdict)}
+    assert state["wind force"] == state["payload"] == considered.OPEN
+    assert state["fouling"] == considered.EXCLUDED
+
+
+def cards(verdict):
+    """Question → its answer, of the first screen."""
+    content = Content(verdict, page_content.pictures())
+    pairs = answer.blocks(source.Source(content, {}))[0].pairs
+    said = {ask: [p if isinstance(p, str) else p.text for line in lines for p in line]
+            for ask, lines in pairs}  # fmt: skip
+    return {ask: "".join(parts) for ask, parts in said.items()}
+
+
+def test_what_to_do_speaks_of_a_test_only_where_there_is_one():
+    do = "What do I do?"
+    assert "test below" not in cards(page_content.verdict("undecided"))[do]
+    note = "A test that separates them: a turning circle."
+    assert "test below" in cards(page_content.verdict("undecided", notes=[note]))[do]
+
+
+def test_what_acts_beside_a_named_cause_is_said_on_the_first_screen():
+    ranking = [{"name": "unknown:heading", "probability": 1.0},
+               {"name": "current", "probability": 0.97}]  # fmt: skip
+    found = cards(page_content.verdict(ranking=ranking))
+    assert "no cause of the catalogue explains (heading)" in found["What is wrong?"]
+    assert "Expect the rest" in found["What do I do?"]
+    assert "Beside" not in cards(page_content.verdict())["What is wrong?"]
+
+
+def test_a_channel_that_was_not_testable_is_not_the_whole_cause():
+    gnss = [{"name": "heading_offset", "reason": "gnss: the velocity is recorded over ground"}]
+    missed = cards(page_content.verdict(unavailable=gnss))["What would have been missed?"]
+    assert "Not testable here: heading offset (gnss)." in missed
+
+
+def test_what_was_not_assessed_is_counted_among_what_would_have_been_missed():
+    nothing = page_content.verdict("coverage", limits=[], ranking=[], rejected=[], traces=[])
+    missed = cards(nothing)["What would have been missed?"]
+    every = sum(not c.special for c in CATALOGUE)
+    assert f"Not assessed: {every - 1} of {every} causes." in missed  # bank is not testable
+
+
+def test_a_verdict_that_is_no_answer_asks_for_more():
+    for word, says in (("none", "Nothing is needed"), ("coverage", "No manoeuvre is known")):
+        made = source.Source(
+            Content(page_content.verdict(word, intervals=[], limits=[]), page_content.pictures()),
+            {},
+        )
+        assert record_next.blocks(made)[0].line[0].startswith(says)
+
+
+def judged(lost=0, lengths=2.0, degrees=10.0):
+    ends = {"median_end_position_lengths": lengths, "median_end_heading_deg": degrees}
+    return {"windows": 5, "judgement": {"diverged": lost} | ends}
+
+
+def test_windows_that_diverged_are_no_part_of_the_median():
+    content = Content(page_content.verdict(), page_content.pictures())
+    about = page_content.verdict()["subject"]
+    run = evaluation_source.Source(content, {"mmg": judged(2)}, about)
+    claim = evaluation_page._claim("mmg", judged(2), run)
+    assert "mmg is 2 ship lengths and 10 deg off, in the median of 3 of 5 windows" in claim
+    assert claim.endswith("; 2 diverged.")
+    assert evaluation_page._diverged(judged(2)) == "2 of 5 windows diverged, so there is no mean."
+    assert evaluation_page._diverged(judged(5)) == "Every window diverged."
+
+
+def test_of_several_runs_the_claim_is_about_each():
+    content = Content(page_content.verdict(), page_content.pictures())
+    answers = {"mmg": judged(), "network": judged(1, 7.0), "lost": judged(5, None, None)}
+    run = evaluation_source.Source(content, answers, page_content.verdict()["subject"])
+    claim = evaluation_page._claim("mmg", answers["mmg"], run)
+    assert "mmg 2 ship lengths and 10 deg off; network 7 ship lengths" in claim
+    assert claim.endswith("off, 1 diverged; lost diverges.")
+
+
+def test_a_share_is_said_once_where_it_is_the_same():
+    assert evaluation_page._span([0.921, 0.924]) == "92%"
+    assert evaluation_page._span([0.97, 1.0]) == "97% to 100%"
+
+
+@pytest.mark.parametrize("name", ["x.pdf", "x.PNG", "x.md"])
+def test_a_page_is_not_written_as_what_it_is_not(tmp_path, name):
+    with pytest.raises(ShiplogError, match="the page is HTML"):
+        paths.check_page(tmp_path / name, "--out")
+    assert paths.check_page(tmp_path / "x.html", "--out") == tmp_path / "x.html"
+
+
+def test_a_recorder_without_a_date_has_none():
+    assert subject.begin("1970-01-01T00:45:00+00:00") == "without a date"
+    assert subject.begin("2026-04-14T02:00:00+00:00") == "2026-04-14 02:00"
+
+
 def test_a_finding_opens_the_recording_at_its_moment(tmp_path):
     folder = page_content.folder(tmp_path / "d")
     text = "".join(read(html.render(page.of_folder(folder))).text)
@@ -169,9 +272,21 @@ def test_a_page_of_ten_voyages_is_below_one_megabyte(tmp_path):
     assert len(html.render(page.of_folder(folder)).encode()) < 1e6
 
 
+def _without(folder, *keys):
+    """The verdict of this folder without one of its keys."""
+    content = json.loads((folder / "verdict.json").read_text())
+    of = content
+    for key in keys[:-1]:
+        of = of[key]
+    del of[keys[-1]]
+    (folder / "verdict.json").write_text(json.dumps(content))
+
+
 @pytest.mark.parametrize(
     ("break_it", "says"),
     [
+        (lambda d: _without(d, "limits"), "does not have limits"),
+        (lambda d: _without(d, "subject", "voyages"), "does not have subject.voyages"),
         (lambda d: (d / "verdict.json").unlink(), "is no result of shiplog"),
         (lambda d: (d / "verdict.json").write_text("{"), "cannot be read"),
         (lambda d: (d / "verdict.json").write_text(json.dumps({"contract": 0})), "contract 1"),

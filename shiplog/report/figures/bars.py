@@ -30,7 +30,8 @@ def spoken(name: str, of: str | None = None) -> str:
     if kind == "unknown":
         return f"outside the catalogue ({family})" if family else "outside the catalogue"
     words = kind.replace("_", " ")
-    return f"{words} ({of or family})" if of or family else words
+    unit = (of or family).replace("_", " ")
+    return f"{words} ({unit})" if unit else words
 
 
 # --- ranking --------------------------------------------------------------------------------------
@@ -105,14 +106,16 @@ def draw_limits(axes: Axes, rows: pl.DataFrame, content: Content) -> None:
     low = min(float(share.min()), 0.1) if len(share) else 0.1
     axes.set_xlim(0.7 * low, max(3.0, 1.2 * float(share.max())) if len(share) else 3.0)
     axes.xaxis.set_major_formatter(lambda v, _: f"{v:g}")
-    axes.set_xlabel("smallest size that would show ÷ realistic size")
+    axes.set_xlabel("smallest size that would show ÷ realistic size", loc="right")
 
 
 def limits_words(rows: pl.DataFrame, content: Content) -> str:
     if rows.is_empty():
         return "No cause was tested."
     small = int((rows["share"] <= 1.0).sum())
-    first = f"{rows['name'][0]} shows best, from {100 * rows['share'][0]:.0f} % of its size"
+    first = (
+        f"{rows['name'][0]} shows best, from {100 * rows['share'][0]:.0f} % of its realistic size"
+    )
     return f"{small} of {len(rows)} causes would show at their realistic size; {first}."
 
 

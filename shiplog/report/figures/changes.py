@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -54,9 +55,16 @@ def words(rows: pl.DataFrame) -> str:
     return "; ".join(said) + "."
 
 
+def _meet(a: tuple[float, float], b: tuple[float, float], turn: float) -> bool:
+    """Whether two intervals have a value in common; of directions, with whole turns between."""
+    return any(a[0] <= b[1] + k * turn and b[0] + k * turn <= a[1] for k in (-1, 0, 1))
+
+
 def verdict(rows: pl.DataFrame, names: Sequence[str]) -> str:
     """In words whether a number changed: where two 90 % intervals have no value in common."""
     if len(rows) < len(names):
         return "named in some only"
-    apart = float(rows["low"].max()) > float(rows["high"].min())  # type: ignore[arg-type]
+    turn = 360.0 if rows["unit"][0] == "deg" and rows["parameter"][0] == "direction" else 0.0
+    spans = rows.select("low", "high").rows()
+    apart = any(not _meet(a, b, turn) for a, b in combinations(spans, 2))
     return "yes: the intervals are apart" if apart else "no: the intervals meet"

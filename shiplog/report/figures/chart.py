@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import polars as pl
 
+from shiplog.nomenclature.numbers import figure
 from shiplog.report import colours
 from shiplog.report.figures import hull, style
 from shiplog.report.figures.content import Content, Picture
@@ -21,6 +22,7 @@ MOST_HULLS = {"closeup": 10, "voyage": 24}  # on one track: more would hide the 
 # where the reader is to see how far off it ends.
 ROOM = {"closeup": 2.0, "voyage": 0.35}
 SHAPE = 1.15  # width of a chart over its height
+MARGIN = 0.12  # of the tracks, left free around them: the scale bar is below the lowest
 METRES_PER_DEGREE = 111_320.0  # of latitude, and of longitude at the equator
 MOST_WINDOWS = 100  # with a track on the chart of a voyage
 GAP_S = 2.5  # s between rows of a second each, from which a track is broken
@@ -166,7 +168,7 @@ def _limit(axes: Axes, table: pl.DataFrame, length: float, room: float) -> None:
         own = table
     ends = [_ends_of(own[name]) for name in ("y0", "x0")]
     size = max(high - low for low, high in ends)
-    margin = max(0.06 * size, 1.2 * length)
+    margin = max(MARGIN * size, 1.2 * length)
     spans = []
     for (low, high), name in zip(ends, ("y0", "x0"), strict=True):
         least, most = _ends_of(table[name])
@@ -283,18 +285,18 @@ def _ends(table: pl.DataFrame, data: PictureData) -> str:
         if key in last and len(last[key]) and len(last.get(MEASURED, ())):
             off = math.hypot(*(last[key][k][0] - last[MEASURED][k][0] for k in ("x0", "y0")))
             found.append(
-                f"At its end {data.models.get(key, key)} is {off:.1f} m ({off / data.length:.1f} "
-                "ship lengths) from where the ship was"
+                f"At its end {data.models.get(key, key)} is {figure(off, 3)} m "
+                f"({figure(off / data.length)} ship lengths) from where the ship was"
             )
     return " ".join(f"{one}." for one in found)
 
 
 def voyage_words(table: pl.DataFrame, content: Content) -> str:
     names = ", ".join(label for _, label, _ in legend(content.data))
-    return (
-        f"Chart of {table['voyage'][0]}, north up, tracks: {names}. Every simulated track begins "
-        "at the measured state, at a dot."
-    )
+    found = f"Chart of {table['voyage'][0]}, north up, tracks: {names}."
+    if not content.data.models:
+        return found
+    return f"{found} Every simulated track begins at the measured state, at a dot."
 
 
 CLOSEUP = Picture(

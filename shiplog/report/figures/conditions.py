@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 SECTORS = 16  # of a wind rose
 BINS = 24  # a side, of drift angle against yaw rate
+HALF_TURN = 180.0  # deg
 SPAN = (0.005, 0.995)  # of the rows, that the axes show
 CAMPAIGNS = {TRAINING: colours.TRAINING, TRIAL: colours.VERMILLION}
 STYLE = {TRAINING: "training voyages", TRIAL: "these voyages"}
@@ -53,6 +54,7 @@ def draw_wind(axes: Axes, rows: pl.DataFrame, content: Content) -> None:
             linewidth=1.4 if outlined else 0.0, label=STYLE[campaign],
         )  # fmt: skip
     axes.set_xticks(np.radians([0, 90, 180, 270]), ["N", "E", "S", "W"])
+    axes.yaxis.set_major_formatter(lambda v, _: f"{v:g} m/s")
     axes.tick_params(labelsize=7.0)
     axes.legend(loc="upper left", bbox_to_anchor=(-0.42, 1.14))
 
@@ -85,7 +87,10 @@ def drift_table(content: Content) -> pl.DataFrame:
     for name in ("drift", "yaw_rate"):
         low, high = np.quantile(rows[name].to_numpy(), SPAN)
         half = 0.5 * max(high - low, 1e-6)
-        edges.append(np.linspace(low - 0.1 * half, high + 0.1 * half, BINS + 1))
+        most = HALF_TURN if name == "drift" else math.inf  # no bin beyond what an angle can be
+        edges.append(
+            np.linspace(max(low - 0.1 * half, -most), min(high + 0.1 * half, most), BINS + 1)
+        )
     found = []
     for campaign in CAMPAIGNS:
         own = rows.filter(pl.col("campaign") == campaign)
@@ -99,6 +104,8 @@ def drift_table(content: Content) -> pl.DataFrame:
 def draw_drift(axes: Axes, rows: pl.DataFrame, content: Content) -> None:
     for campaign, colour in CAMPAIGNS.items():
         own = rows.filter(pl.col("campaign") == campaign)
+        if own.is_empty():
+            continue
         inside = campaign == TRIAL
         axes.plot(
             own["drift_deg"].to_numpy(), own["yaw_rate_degps"].to_numpy(), "o" if inside else "s",

@@ -9,15 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 import polars as pl
 
+from shiplog.nomenclature.numbers import figure
 from shiplog.report import colours
 from shiplog.report.figures.chart import legend
 from shiplog.report.figures.content import Content, Picture
-from shiplog.report.figures.picture_data import MEASURED
+from shiplog.report.figures.picture_data import BEFORE, MEASURED
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 LEVELS = (0.05, 0.5, 0.95)  # of the windows: a band of 90 %, and its median
+MOST_MEDIANS = 10.0  # that the axis goes up to
 LEAST_WINDOWS = 3  # fewer have no band
 POSITION, HEADING = "position", "heading"
 TURN = 2.0 * np.pi
@@ -69,7 +71,7 @@ def draw(axes: Axes, rows: pl.DataFrame, content: Content, of: str) -> None:
         elapsed, half = data.band["elapsed"].to_numpy(), data.band[of].to_numpy()
         half = np.degrees(half) if of == HEADING else half
         axes.fill_between(elapsed, half, color=colours.web(colours.GRID), linewidth=0, zorder=0,
-                          label="90 % band of the model itself")  # fmt: skip
+                          label=_band_label(content))  # fmt: skip
     for key, label, colour in legend(data):
         own = rows.filter(pl.col("model") == key)
         if key == MEASURED or own.is_empty():
@@ -82,7 +84,8 @@ def draw(axes: Axes, rows: pl.DataFrame, content: Content, of: str) -> None:
         axes.plot(elapsed, median, color=colour, linewidth=1.8, label=label)
     axes.set_xlabel("time since the start of the window [s]")
     axes.set_xlim(left=0.0)
-    axes.set_ylim(0.0, _top(rows))
+    top = _top(rows)
+    axes.set_ylim(0.0, min(top, 180.0) if of == HEADING else top)
     axes.set_ylabel("position error [m]" if of == POSITION else "heading error [deg]")
     if of == POSITION:
         lengths = axes.secondary_yaxis(
@@ -93,11 +96,20 @@ def draw(axes: Axes, rows: pl.DataFrame, content: Content, of: str) -> None:
     axes.legend(loc="upper left")
 
 
+def _band_label(content: Content) -> str:
+    """Of several runs the band is that of the first."""
+    models = content.data.models
+    if len(models) < 2 or BEFORE in models:
+        return "90 % band of the model itself"
+    return f"90 % band that {next(iter(models.values()))} states"
+
+
 def _top(rows: pl.DataFrame) -> float:
-    """A model that diverges does not flatten the others: up to thrice the largest median."""
+    """All of the 90 % of the windows; a model that diverges does not flatten the others: up to ten
+    times the largest median."""
     highest, median = rows["high"].max(), rows["median"].max()
     assert isinstance(highest, float) and isinstance(median, float)
-    return 1.35 * max(min(highest, 3.0 * median), 1e-3)
+    return max(1.25 * min(highest, MOST_MEDIANS * median), 1e-3)
 
 
 def words(rows: pl.DataFrame, content: Content, of: str) -> str:
@@ -109,13 +121,14 @@ def words(rows: pl.DataFrame, content: Content, of: str) -> str:
         last = rows.filter(pl.col("model") == key).tail(1)
         if len(last):
             found.append(
-                f"After {last['elapsed'][0]:.0f} s {content.data.models.get(key, key)} is "
-                f"{last['median'][0]:.2g} {unit} off ({last['low'][0]:.2g} to "
-                f"{last['high'][0]:.2g})"
+                f"after {last['elapsed'][0]:.0f} s {content.data.models.get(key, key)} is "
+                f"{figure(last['median'][0])} {unit} off ({figure(last['low'][0])} to "
+                f"{figure(last['high'][0])})"
             )
+    text = "; ".join(found)
     return (
         f"{of.capitalize()} error of held-out windows: the line is their median, and nine in ten "
-        f"of them are in the band around it. {'; '.join(found)}."
+        f"of them are in the band around it. {text[:1].upper()}{text[1:]}."
     )
 
 

@@ -56,6 +56,8 @@ def draw(axes: Axes, rows: pl.DataFrame, content: Content, channel: str) -> None
     middle = np.concatenate([force[np.isfinite(force)], named[np.isfinite(named)]])
     if len(middle):
         low, high = np.quantile(middle, (0.005, 0.995))
+        span = high - low  # an extreme is shown, unless it is so far out that it flattens the rest
+        low, high = max(middle.min(), low - span), min(middle.max(), high + span)
         room = 0.25 * max(high - low, 1e-9)
         axes.set_ylim(min(low, 0.0) - room, max(high, 0.0) + room)
     axes.set_xlabel("time since the start of the voyage [s]")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import polars as pl
 
+from shiplog.nomenclature.numbers import counted
 from shiplog.report import colours
 from shiplog.report.figures.content import Content, Picture
 
@@ -20,6 +21,8 @@ KINDS = {  # of an interval → its words and colour
 }
 OTHERS = (colours.BLUE, colours.GREEN, colours.PURPLE, colours.TEXT, colours.SKY)  # of other kinds
 MOST_KINDS = 8  # in a legend
+LONGEST = 26  # letters of a name beside the axis: more would leave no room for the voyages
+SHORTEST = 0.005  # of the axis, that a stretch is drawn with: a shorter one could not be seen
 WHOLE = 0.95  # of a voyage: a finding of as much is one of the whole voyage
 SCHEMA = {
     "voyage": pl.String, "kind": pl.String, "start_s": pl.Float64, "end_s": pl.Float64,
@@ -52,22 +55,29 @@ def draw(axes: Axes, rows: pl.DataFrame, content: Content) -> None:
     seen: set[str] = set()
     kinds = [k for k in rows["kind"].unique(maintain_order=True) if k not in ("sailed", *KINDS)]
     others = {k: (k, OTHERS[i % len(OTHERS)]) for i, k in enumerate(kinds)}
+    least = SHORTEST * float(rows["end_s"].to_numpy().max())
     for voyage, kind, start, end in rows.iter_rows():
         if kind == "sailed":
             axes.barh(place[voyage], end, height=0.28, color=colours.web(colours.GRID))
             continue
         label, colour = (KINDS | others)[kind]
         axes.barh(
-            place[voyage], end - start, left=start, height=0.5, color=colours.web(colour),
+            place[voyage], max(end - start, least), left=start, height=0.5,
+            color=colours.web(colour),
             label=None if kind in seen or len(seen) >= MOST_KINDS else label,
         )  # fmt: skip
         seen.add(kind)
-    axes.set_yticks(np.arange(len(names)), names, fontsize=7.0)
+    axes.set_yticks(np.arange(len(names)), [short(name) for name in names], fontsize=7.0)
     axes.set_ylim(max(len(names), 2) - 0.4, -0.6)
-    axes.set_xlabel("time since the start of the voyage [s]")
+    axes.set_xlabel("time since the start of the voyage [s]", loc="right")
     if seen:
         axes.legend(loc="lower center", bbox_to_anchor=(0.45, 1.0), ncols=3, columnspacing=1.0,
                     handlelength=1.0)  # fmt: skip
+
+
+def short(name: str) -> str:
+    """The middle of a long name is left out: names of recorders differ at their ends."""
+    return name if len(name) <= LONGEST else f"{name[:9]}…{name[-14:]}"
 
 
 def words(rows: pl.DataFrame, content: Content) -> str:
@@ -78,7 +88,7 @@ def words(rows: pl.DataFrame, content: Content) -> str:
     text = ", ".join(
         f"{KINDS.get(k, (k,))[0]} {n} {'time' if n == 1 else 'times'}" for k, n in kinds.iter_rows()
     )
-    return f"Stretches of {rows['voyage'].n_unique()} voyages: {text}."
+    return f"Stretches of {counted(rows['voyage'].n_unique(), 'voyage')}: {text}."
 
 
 OF_STRETCHES = Picture("Stretches", table, draw, words, height=1.1, by_row=0.22, rows_of="voyage")

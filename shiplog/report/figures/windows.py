@@ -14,9 +14,9 @@ from shiplog.report.figures.content import Content, Picture
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FEW_TICKS = 4  # voyages whose names stand next to each other
+LETTER = 0.022  # of the axis, that a letter of a name takes, with what is left free of it
+SLANTED = 0.07  # of the axis, that a slanted name takes
 MOST_WINDOWS = 300  # that are drawn
-MOST_TICKS = 8  # voyages with a name under the axis; more would overlap
 
 
 def table(content: Content) -> pl.DataFrame:
@@ -57,15 +57,31 @@ def draw(axes: Axes, rows: pl.DataFrame, content: Content) -> None:
                       markersize=3.5, label=label)  # fmt: skip
     axes.set_yscale("log")
     firsts = rows.group_by("voyage", maintain_order=True).agg(pl.col("place").min())
-    step = -(-len(firsts) // MOST_TICKS)
-    axes.set_xticks(firsts["place"].to_list()[::step])
-    ticks = [_short(name) for name in firsts["voyage"].to_list()[::step]]
-    few = len(ticks) <= FEW_TICKS
-    axes.set_xticklabels(ticks, rotation=0 if few else 30, ha="left" if few else "right",
+    places, names, flat = ticks(firsts["place"].to_list(), firsts["voyage"].to_list(),
+                                int(rows["place"].to_numpy().max()) + 1)  # fmt: skip
+    axes.set_xticks(places)
+    axes.set_xticklabels(names, rotation=0 if flat else 30, ha="left" if flat else "right",
                          rotation_mode="anchor")  # fmt: skip
     axes.set_xlabel("windows, from the first of each voyage on")
     axes.set_ylabel("L of a window")
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+
+
+def ticks(places: list[int], names: list[str], windows: int) -> tuple[list[int], list[str], bool]:
+    """Voyages that have their name under the axis, so that none overlaps the next, and whether the
+    names lie flat: they do where each ends before the next begins."""
+    short = [_short(name) for name in names]
+    flat = all(
+        (after - before) / windows > LETTER * len(name)
+        for before, after, name in zip(places, places[1:], short, strict=False)
+    )
+    if flat:
+        return places, short, True
+    kept: list[int] = []
+    for i, place in enumerate(places):
+        if not kept or (place - places[kept[-1]]) / windows >= SLANTED:
+            kept.append(i)
+    return [places[i] for i in kept], [short[i] for i in kept], False
 
 
 def _short(name: str) -> str:

@@ -27,9 +27,14 @@ Line = Sequence[Part]  # a line of text, part by part
 def number(value: float, unit: str = "", digits: int = 3) -> Number:
     """With a thin space before its unit; in per cent where the unit is "1"."""
     if unit == "1":
-        return Number(value, f"{figure(100.0 * value, digits)} %")
+        return Number(value, f"{figure(100.0 * value, digits)}\u202f%")
     text = figure(value, digits)
     return Number(value, f"{text}\u202f{unit}" if unit else text)
+
+
+def seconds(value: float) -> Number:
+    """A time, or a length of time, to the tenth of a second: a recorder's stamps are no finer."""
+    return Number(value, f"{value:.1f}".removesuffix(".0") + "\u202fs")
 
 
 def share(value: float) -> Number:

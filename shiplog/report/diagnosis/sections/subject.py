@@ -74,6 +74,12 @@ def dates(starts: Sequence[str]) -> str:
     return days[0] if days[0] == days[-1] else f"{days[0]} to {days[-1]}"
 
 
+def begin(start: str) -> str:
+    """Day and minute of an ISO stamp; of a recorder that knows no date, nothing that looks like
+    one."""
+    return "without a date" if start.startswith("1970") else start[:16].replace("T", " ")
+
+
 def sentence(subject: Subject) -> str:
     """Who, on what, when: the head of a page."""
     names = listed((v.name for v in subject.voyages), most=MOST_VOYAGES)

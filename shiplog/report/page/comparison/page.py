@@ -13,7 +13,7 @@ import polars as pl
 from shiplog.exceptions import listed
 from shiplog.report.diagnosis.sections.subject import dates
 from shiplog.report.figures import changes, style
-from shiplog.report.figures.bars import size_in_words, spoken
+from shiplog.report.figures.bars import STATED, size_in_words, spoken
 from shiplog.report.figures.content import Content
 from shiplog.report.page.blocks import (
     Answers,
@@ -25,6 +25,7 @@ from shiplog.report.page.blocks import (
     Line,
     Page,
     Paragraph,
+    Part,
     Section,
     number,
     probability,
@@ -54,9 +55,10 @@ def of_items(items: Sequence[Item]) -> Page:
     elif all(one.kind == "evaluation" for one in items):
         sections.append(Section("errors", "Errors", _errors(items)))
     names = listed((one.name for one in items), most=6)
+    ships = listed(dict.fromkeys(str(one.subject["ship"]) for one in items), most=3)
     return Page(
-        title=f"{first.subject['ship']}: {names}",
-        kicker=f"{first.subject['ship']} · {names} · shiplog {version('shiplog')}",
+        title=f"{ships}: {names}",
+        kicker=f"{ships} · {names} · shiplog {version('shiplog')}",
         word="unlike results" if unlike else "compared",
         tone="found" if unlike else tone,
         claim=claim,
@@ -112,12 +114,12 @@ def _verdicts(items: Sequence[Item]) -> list[Block]:
     rows = []
     for one in items:
         verdict = _verdict(one)
-        first = verdict["ranking"][0] if verdict["ranking"] else None
+        ranking = verdict["ranking"]
+        likely = [r for r in ranking if r["probability"] >= STATED] or ranking[:1]
         gain = verdict.get("gain")
         rows.append((
             [one.name], [_word(one)],
-            ["-"] if first is None else [f"{spoken(first['name'])} ",
-                                         probability(first["probability"])],
+            _ranked(likely),
             ["-"] if not gain else [share(gain["reduction"]), " (", share(gain["low"]), " to ",
                                     share(gain["high"]), ")"],
             ["-"] if not gain else [number(gain["before"])],
@@ -125,6 +127,14 @@ def _verdicts(items: Sequence[Item]) -> list[Block]:
         ))  # fmt: skip
     head = ("result", "verdict", "likeliest", "explained", "L before", "L after")
     return [Answers(pairs), Grid(head, rows, head[4:])]
+
+
+def _ranked(answers: Sequence[Mapping[str, Any]]) -> Line:
+    """Each with its probability; several may act at once."""
+    found: list[Part] = []
+    for one in answers:
+        found += [", " if found else "", spoken(one["name"]), " ", probability(one["probability"])]
+    return found or ["-"]
 
 
 def sizes(items: Sequence[Item]) -> pl.DataFrame:

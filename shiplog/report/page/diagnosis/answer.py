@@ -10,6 +10,7 @@ from shiplog.nomenclature.numbers import counted, percent
 from shiplog.report.diagnosis.sections.subject import MOST_VOYAGES, dates
 from shiplog.report.figures.bars import size_in_words, spoken
 from shiplog.report.page.blocks import Answers, Block, Line, number, probability, share
+from shiplog.report.page.diagnosis import considered
 from shiplog.report.page.diagnosis.source import Source
 
 MOST_MISSED = 4  # causes that are listed on the first screen; the others are counted
@@ -27,6 +28,12 @@ TO_DO = {
     "external": "Leave these stretches out, or record what pushed the ship there.",
 }
 CALIBRATED = "Of the answers that are given with 0.9, nine in ten are right."
+NONE_STATED = "An answer is named from 0.9 on, where nine in ten are right."
+SEPARATES = "A test that separates"  # begins the note of it
+NO_TEST = (
+    "Do not change the model yet: it is not known which of these acts. No test that would separate "
+    "them is known; record longer voyages, with more different manoeuvres."
+)
 
 
 def claim(source: Source) -> str:
@@ -94,8 +101,22 @@ def blocks(source: Source) -> list[Block]:
 
 def _what(verdict: Mapping[str, Any]) -> list[Line]:
     if verdict["causes"]:
-        return [[cause["sentence"]] for cause in verdict["causes"]]
+        found: list[Line] = [[cause["sentence"]] for cause in verdict["causes"]]
+        if (rest := _outside(verdict)) is not None:
+            found.append(
+                [f"Beside that, something acts that no cause of the catalogue explains{rest}."]
+            )
+        return found
     return [[verdict["sentence"]]]
+
+
+def _outside(verdict: Mapping[str, Any]) -> str | None:
+    """What goes with something that is sure to act beside the named causes: " (heading)"."""
+    for one in verdict["ranking"]:
+        if one["name"].startswith("unknown") and one["probability"] >= STATED:
+            family = one["name"].partition(":")[2].replace("_", " ")
+            return f" ({family})" if family else ""
+    return None
 
 
 def _sure(verdict: Mapping[str, Any]) -> list[Line]:
@@ -107,7 +128,8 @@ def _sure(verdict: Mapping[str, Any]) -> list[Line]:
         [f"{_begun(spoken(one['name']))}: probability ", probability(one["probability"]), "."]
         for one in stated
     ]
-    return [*found, [CALIBRATED]]
+    sure = ranking[0]["probability"] >= STATED
+    return [*found, [CALIBRATED if sure else NONE_STATED]]
 
 
 def _big(verdict: Mapping[str, Any]) -> list[Line]:
@@ -139,9 +161,16 @@ def _big(verdict: Mapping[str, Any]) -> list[Line]:
 def _do(verdict: Mapping[str, Any]) -> list[Line]:
     own = [cause["remedy"] for cause in verdict["causes"] if cause.get("remedy")]
     if own:
-        return [[text] for text in dict.fromkeys(own)]
+        found: list[Line] = [[text] for text in dict.fromkeys(own)]
+        if _outside(verdict) is not None:
+            found.append(["Expect the rest of the error to stay until its cause is known."])
+        return found
     if verdict["contradictions"]:
         return [["Correct the profile where the channels contradict each other, and ingest again."]]
+    if verdict["verdict"] == "undecided" and not any(
+        note.startswith(SEPARATES) for note in verdict["notes"]
+    ):
+        return [[NO_TEST]]
     return [[TO_DO.get(verdict["verdict"], "Look at the causes below, and test them.")]]
 
 
@@ -158,10 +187,14 @@ def missed(verdict: Mapping[str, Any]) -> list[Line]:
         )
         more = len(hidden) - MOST_MISSED
         rest = f"; and {more} more" if more > 0 else ""
-        found.append([f"Even at a realistic size: {text}{rest}."])
+        said = f"Even at a realistic size: {text}{rest}."
+        found.append([said.replace(" %", "\u202f%")])  # never apart at the end of a line
     elif verdict["limits"]:
         found.append([f"At a realistic size, none of {len(verdict['limits'])} causes."])
-    if untested := sorted({spoken(one["name"]) for one in verdict["unavailable"]}):
+    became = [(name, state) for name, state, _ in considered.table(verdict)]
+    if absent := sum(state == considered.ABSENT for _, state in became):
+        found.append([f"Not assessed: {absent} of {len(became)} causes."])
+    if untested := [name for name, state in became if state == considered.UNTESTABLE]:
         text = ", ".join(untested[:MOST_MISSED])
         more = len(untested) - MOST_MISSED
         found.append([f"Not testable here: {text}{f', and {more} more' if more > 0 else ''}."])

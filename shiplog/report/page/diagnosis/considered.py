@@ -10,10 +10,13 @@ from shiplog.report.figures.bars import size_in_words, spoken
 from shiplog.report.page.blocks import Block, Fold, Gallery, Grid, Line, Paragraph, probability
 from shiplog.report.page.diagnosis.source import Source
 
-NAMED, TRACE, EXCLUDED, SMALL, UNTESTABLE, ABSENT = (
-    "named", "present, below practical size", "excluded", "too small to show", "not testable",
-    "not assessed",
+NAMED, TRACE, OPEN, EXCLUDED, SMALL, UNTESTABLE, ABSENT = (
+    "named", "present, below practical size", "not decided", "excluded", "too small to show",
+    "not testable", "not assessed",
 )  # fmt: skip
+
+
+LEAST = 0.1  # probability, from which an answer that is not named is not excluded either
 
 
 def blocks(source: Source) -> list[Block]:
@@ -34,6 +37,8 @@ def table(verdict: Mapping[str, Any]) -> list[tuple[str, str, Line]]:
     traces = {_label(c["name"], _which(c)): c for c in verdict["traces"]}
     limits = {_label(c["name"], c.get("channel") or c.get("actuator")): c
               for c in verdict["limits"]}  # fmt: skip
+    weighed = {one["name"]: one["probability"] for one in verdict["ranking"]
+               if one["probability"] >= LEAST}  # fmt: skip
     rejected = _reasons(verdict["rejected"])
     untestable = _reasons(verdict["unavailable"])
     labels = [c.label for c in CATALOGUE if not c.special]
@@ -46,19 +51,22 @@ def table(verdict: Mapping[str, Any]) -> list[tuple[str, str, Line]]:
         units = [one for one in every if one.startswith(f"{label}:") and one not in labels]
         if label not in named and units:
             continue  # a cause of several units stands there once for each
-        state, why = _state(label, bare, named, traces, limits, rejected, untestable)
+        state, why = _state(label, bare, named, traces, weighed, limits, rejected, untestable)
         rows.append((spoken(label), state, why))
     return rows
 
 
 def _state(
-    label: str, bare: str, named: Mapping, traces: Mapping, limits: Mapping, rejected: Mapping,
-    untestable: Mapping,
+    label: str, bare: str, named: Mapping, traces: Mapping, weighed: Mapping, limits: Mapping,
+    rejected: Mapping, untestable: Mapping,
 ) -> tuple[str, Line]:  # fmt: skip
     if label in named:
         return NAMED, ["probability ", probability(named[label]["probability"])]
     if label in traces:
         return TRACE, [traces[label]["sentence"]]
+    found = any(_is_of(one, bare) for one in (*named, *traces))
+    if label not in untestable and not found and (label in weighed or bare in weighed):
+        return OPEN, ["probability ", probability(weighed.get(label, weighed.get(bare)))]
     size = limits.get(label)
     least = "" if size is None else size_in_words(size["parameters"])
     for key in (label, bare):
@@ -76,6 +84,10 @@ def _state(
 
 def _label(name: str, of: str | None) -> str:
     return f"{name}:{of}" if of else name
+
+
+def _is_of(label: str, bare: str) -> bool:
+    return label.partition(":")[0] == bare
 
 
 def _which(cause: Mapping[str, Any]) -> str | None:

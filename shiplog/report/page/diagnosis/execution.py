@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from shiplog.report.page.blocks import Block, Grid, Items, Line, Paragraph, number
+from shiplog.report.diagnosis.sections.subject import begin
+from shiplog.report.page.blocks import Block, Grid, Items, Line, Paragraph, number, seconds
 from shiplog.report.page.diagnosis.source import Source
 
 
@@ -14,15 +15,15 @@ def blocks(source: Source) -> list[Block]:
             left_out[one["voyage"]] += one["end_s"] - one["start_s"]
     rows: list[tuple[Line, ...]] = [
         (
-            [one["name"]], [one["start"][:16].replace("T", " ")],
-            [number(one["seconds"], "s", 6)],
-            [number(left_out[one["name"]], "s", 6)] if one["name"] in left_out else ["-"],
+            [one["name"]], [begin(one["start"])],
+            [seconds(one["seconds"])],
+            [seconds(left_out[one["name"]])] if one["name"] in left_out else ["-"],
         )
         for one in subject["voyages"]
     ]  # fmt: skip
     head = ("voyage", "start, UTC", "length", "left out, pushed or towed")
     found: list[Block] = [Grid(head, rows, head[2:])]
-    windows = verdict.get("gain", {}).get("held_out_windows")
+    windows = (verdict.get("gain") or {}).get("held_out_windows")
     lines: list[Line] = []
     if windows is not None:
         lines.append([number(windows), " held-out windows of ", number(subject["window_s"], "s"),

@@ -10,10 +10,12 @@ def blocks(source: Source) -> list[Block]:
     verdict = source.verdict
     found: list[Block] = []
     if gain := verdict.get("gain"):
+        held = gain["held_out_windows"]
         found.append(Paragraph([
             "L (Eq. 8 of Wakita et al. 2024) is ", number(gain["before"]), " before and ",
-            number(gain["after"]), " after, on ", number(gain["held_out_windows"]),
-            " windows. Each was predicted with numbers that were fitted without its voyage.",
+            number(gain["after"]), " after, on ", number(held),
+            f"{' window' if held == 1 else ' windows'}. Each was predicted with numbers that "
+            "were fitted without its voyage.",
         ]))  # fmt: skip
     rows = []
     channels = (verdict.get("gain") or {}).get("channels", {})

@@ -6,6 +6,7 @@ from shiplog.report.figures.bars import size_in_words, spoken
 from shiplog.report.page.blocks import Block, Items, Line, Number, Paragraph, number
 from shiplog.report.page.diagnosis.source import Source
 
+ENDS = ("named", "none")  # verdicts that are an answer
 MOST = 6  # lines: more is no plan
 
 
@@ -28,11 +29,15 @@ def blocks(source: Source) -> list[Block]:
               for one in uncovered[:2]]  # fmt: skip
     hidden = [one for one in verdict["limits"] if one["share"] > 1.0][:2]
     lines += [
-        [f"To see {spoken(one['name'])} below {size_in_words(one['parameters'])}: more of what it "
-         "acts in, and longer."]
+        [f"A smaller {spoken(one['name'], one.get('channel') or one.get('actuator'))} than "
+         f"{size_in_words(one['parameters'])} would not have shown: sail longer, and more in the "
+         "conditions in which it acts."]
         for one in hidden
     ]  # fmt: skip
     if not lines:
+        if verdict["verdict"] not in ENDS:
+            return [Paragraph(["No manoeuvre is known that would decide it. More voyages, of "
+                               "other courses, speeds and winds, tell more."])]  # fmt: skip
         return [
             Paragraph(["Nothing is needed for this answer. More voyages find smaller changes."])
         ]

@@ -15,6 +15,11 @@ from shiplog.report.figures.content import Content
 from shiplog.report.page.blocks import Drawn
 
 VERDICT, PROVENANCE, GATE = "verdict.json", "provenance.json", "gate.json"
+NEEDED = (  # keys of a verdict that the page is made of
+    "verdict", "sentence", "causes", "ranking", "rejected", "traces", "wrong", "intervals",
+    "unseen", "limits", "unavailable", "notes", "contradictions", "base", "subject",
+)  # fmt: skip
+OF_SUBJECT = ("ship", "length_m", "run", "voyages", "window_s", "shiplog")
 
 
 @dataclass(frozen=True)
@@ -75,16 +80,25 @@ def read(folder: Path) -> Source:
             f"{folder} was written by an earlier shiplog: it does not have what a page needs.",
             hint="diagnose again into a new folder.",
         )
+    subject = verdict["subject"] if isinstance(verdict["subject"], dict) else {}
+    missing = [key for key in NEEDED if key not in verdict]
+    if missing := missing + [f"subject.{key}" for key in OF_SUBJECT if key not in subject]:
+        raise ShiplogError(
+            f"{folder / VERDICT} is not whole: it does not have {', '.join(missing)}.",
+            hint="diagnose again into a new folder.",
+        )
     try:
         provenance = _json(folder / PROVENANCE)
     except ShiplogError:
         provenance = {}
     data = picture_data.load(folder / picture_data.FOLDER)
-    gate = _json(folder / GATE) if (folder / GATE).is_file() else None
+    gate = None
+    if (folder / GATE).is_file():
+        gate = _json(folder / GATE, "ask `shiplog gate` again, or take the file away.")
     return Source(Content(verdict, data), provenance, gate)
 
 
-def _json(path: Path) -> dict:
+def _json(path: Path, again: str = "diagnose again into a new folder.") -> dict:
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
         if not isinstance(found, dict):
@@ -95,7 +109,5 @@ def _json(path: Path) -> dict:
             hint="give the folder that `shiplog diagnose` wrote (--out).",
         ) from None
     except (OSError, ValueError) as error:
-        raise ShiplogError(
-            f"{path} cannot be read: {error}.", hint="diagnose again into a new folder."
-        ) from error
+        raise ShiplogError(f"{path} cannot be read: {error}.", hint=again) from error
     return found

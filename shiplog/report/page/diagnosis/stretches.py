@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from shiplog.report.page.blocks import Block, Command, Fold, Gallery, Grid, Paragraph, number
+from shiplog.report.page.blocks import Block, Command, Fold, Gallery, Grid, Paragraph, seconds
 from shiplog.report.page.diagnosis.source import Source
 from shiplog.report.page.diagnosis.where import moment
 
@@ -14,7 +14,7 @@ def blocks(source: Source) -> list[Block]:
     found: list[Block] = [Gallery(source.gallery(("stretches",)))]
     rows = [
         (
-            [one["voyage"]], [number(one["start_s"], "s", 6)], [number(one["end_s"], "s", 6)],
+            [one["voyage"]], [seconds(one["start_s"])], [seconds(one["end_s"])],
             [one["kind"]], [one["sentence"]],
         )
         for one in verdict["intervals"][:MOST_ROWS]

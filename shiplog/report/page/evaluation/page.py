@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from shiplog.exceptions import listed
 from shiplog.nomenclature.channels import DEGREE
-from shiplog.nomenclature.numbers import counted, figure
-from shiplog.report.diagnosis.sections.subject import MOST_VOYAGES, dates
+from shiplog.nomenclature.numbers import counted, figure, percent
+from shiplog.report.diagnosis.sections.subject import MOST_VOYAGES, begin, dates
 from shiplog.report.diagnosis.terms import TERMS
 from shiplog.report.figures import pictures, style
 from shiplog.report.figures.content import Content
@@ -28,6 +28,7 @@ from shiplog.report.page.blocks import (
     Paragraph,
     Section,
     number,
+    seconds,
     share,
 )
 from shiplog.report.page.evaluation.source import Source
@@ -45,12 +46,15 @@ def of_source(source: Source) -> Page:
     runs = list(source.answers)
     judged = source.answers[runs[0]]
     better = _beats(judged)
+    word = "better than its baselines" if better else "not better than every baseline"
+    if len(runs) > 1:
+        word = "compared"
     return Page(
         title=f"{subject['ship']}: evaluation of {listed(runs, most=3)}",
         kicker=f"{subject['ship']}, {subject['length_m']:g} m · {names} · {when} · "
         f"{listed(runs, most=4)} · shiplog {subject['shiplog']}",
-        word="better than its baselines" if better else "no better than its baselines",
-        tone="good" if better else "open",
+        word=word,
+        tone="good" if better and len(runs) == 1 else "open",
         claim=_claim(runs[0], judged, source),
         sections=[
             Section("answer", "The answer", _answer(source)),
@@ -69,13 +73,31 @@ def _claim(run: str, answer: Mapping[str, Any], source: Source) -> str:
     names = listed((one["name"] for one in subject["voyages"]), most=MOST_VOYAGES)
     when = dates([one["start"] for one in subject["voyages"]])
     held = counted(answer["windows"], "window")
+    also = ""
+    if lost := judged["diverged"]:
+        held, also = f"{answer['windows'] - lost} of {held}", f"; {lost} diverged"
+    if len(source.answers) > 1:
+        each = "; ".join(_off(name, one) for name, one in source.answers.items())
+        return f"After {subject['window_s']} s, medians of {held} of {names} ({when}): {each}."
     lengths, degrees = judged["median_end_position_lengths"], judged["median_end_heading_deg"]
     if lengths is None or not math.isfinite(lengths):
         return f"On {held} of {names} ({when}), {run} diverges."
     return (
         f"After {subject['window_s']} s {run} is {figure(lengths)} ship lengths and "
-        f"{figure(degrees)} deg off, in the median of {held} of {names} ({when})."
+        f"{figure(degrees)} deg off, in the median of "
+        f"{held} of {names} ({when}){also}."
     )
+
+
+def _off(run: str, answer: Mapping[str, Any]) -> str:
+    """How far off one of several runs is."""
+    judged = answer["judgement"]
+    lengths, lost = judged["median_end_position_lengths"], judged["diverged"]
+    if lengths is None or not math.isfinite(lengths):
+        return f"{run} diverges"
+    degrees = figure(judged["median_end_heading_deg"])
+    also = f", {lost} diverged" if lost else ""
+    return f"{run} {figure(lengths)} ship lengths and {degrees} deg off{also}"
 
 
 def gallery(content: Content, names: tuple[str, ...], voyage: str | None = None) -> list[Drawn]:
@@ -101,37 +123,55 @@ def _beats(answer: Mapping[str, Any]) -> bool:
 
 
 def _answer(source: Source) -> list[Block]:
-    answer = next(iter(source.answers.values()))
+    run, answer = next(iter(source.answers.items()))
     length, window = source.subject["length_m"], source.subject["window_s"]
     yaw_rate = answer["rmse"]["yaw_rate"]
     big: list[Line] = [
-        [f"After {window} s it is ", number(answer["end_position_m"], "m"), " (",
-         f"{answer['end_position_m'] / length:.2g}", " ship lengths) and ",
+        [f"After {window} s {run} is ", number(answer["end_position_m"], "m"), " (",
+         figure(answer["end_position_m"] / length), " ship lengths) and ",
          number(answer["end_heading_deg"], "deg"), " off, in the mean."],
         ["Root mean square: surge ", number(answer["rmse"]["surge"], "m/s"), ", sway ",
          number(answer["rmse"]["sway"], "m/s"), ", yaw rate ",
          Number(yaw_rate, f"{yaw_rate / DEGREE:.2g}\u202fdeg/s"),
          "."],
-    ] if answer["end_position_m"] is not None else [["Every window diverged."]]  # fmt: skip
+    ] if answer["end_position_m"] is not None else [[_diverged(answer)]]  # fmt: skip
     sure: list[Line] = [[number(answer["windows"]), f" windows of {window} s."]]
     if answer["band_90"]:
-        inside = min(answer["band_90"].values())
-        sure.append(["Its own 90 % band holds ", share(inside), " of the samples or more."])
+        inside = answer["band_90"].values()
+        sure.append([f"The 90 % band that {run} states holds ", _span(list(inside)),
+                     " of the samples of a channel."])  # fmt: skip
     else:
-        sure.append(["It states no band of its own."])
+        sure.append([f"{run} states no band of its own."])
+    if len(answer.get("seeds", ())) > 1:
+        sure.append([f"Numbers are means of {len(answer['seeds'])} seeds; the pictures show the "
+                     "seed whose error is the median."])  # fmt: skip
     seen = [one["coverage"] for one in answer["voyages"].values() if one["coverage"] is not None]
     where: list[Line] = [
-        [f"Inside the training data: {100 * min(seen):.0f} to {100 * max(seen):.0f} % of the "
-         "seconds of a voyage."] if seen else ["Coverage is not known."],
+        ["Inside the training data: ", _span(seen), " of the seconds of a voyage."]
+        if seen else ["Coverage is not known."],
         [_worst_in_words(answer)],
     ]  # fmt: skip
     return [
         Answers([
-            ("How good?", [[answer["sentence"]]]), ("How big are the errors?", big),
+            ("How good?", [[one["sentence"]] for one in source.answers.values()]),
+            ("How big are the errors?", big),
             ("How sure?", sure), ("Where is it worst?", where),
         ]),
         _models(source),
     ]  # fmt: skip
+
+
+def _diverged(answer: Mapping[str, Any]) -> str:
+    lost = answer["judgement"]["diverged"]
+    if lost >= answer["windows"]:
+        return "Every window diverged."
+    return f"{lost} of {counted(answer['windows'], 'window')} diverged, so there is no mean."
+
+
+def _span(shares: Sequence[float]) -> str:
+    """The least and the largest share; one number where they are written alike."""
+    low, high = percent(min(shares)), percent(max(shares))
+    return low if low == high else f"{low} to {high}"
 
 
 def _worst_in_words(answer: Mapping[str, Any]) -> str:
@@ -182,7 +222,7 @@ def _voyages(source: Source) -> list[Block]:
     found: list[Block] = [Grid(head, rows, head[1:])]
     if worst := answer.get("worst"):
         lines = [
-            ([one["voyage"]], [number(one["start_s"], "s", 6)], _or_diverged(one["loss"]),
+            ([one["voyage"]], [seconds(one["start_s"])], _or_diverged(one["loss"]),
              [one["reason"] or "inside the training data"])
             for one in worst
         ]  # fmt: skip
@@ -203,7 +243,7 @@ def moment(subject: Mapping[str, Any], voyage: str, seconds: float) -> str:
 def _execution(source: Source) -> list[Block]:
     subject = source.subject
     rows = [
-        ([one["name"]], [one["start"][:16].replace("T", " ")], [number(one["seconds"], "s", 6)])
+        ([one["name"]], [begin(one["start"])], [seconds(one["seconds"])])
         for one in subject["voyages"]
     ]
     head = ("voyage", "start, UTC", "length")

@@ -26,6 +26,7 @@ from shiplog.report.page.blocks import (
     Paragraph,
     Section,
     number,
+    seconds,
 )
 from shiplog.report.page.evaluation.page import gallery
 from shiplog.voyages.store.store import Store
@@ -46,12 +47,15 @@ def of_voyages(store: Store, names: Sequence[str]) -> Page:
     usable = sum(one.usable_s or 0 for one in reports.values())
     what = "can be used" if not serious else "cannot all be used as they stand"
     shown = listed(names, most=MOST_VOYAGES)
+    word, tone = ("sound", "good") if not findings else ("usable", "open")
+    if serious or lost:
+        word, tone = "look first", "found"
     return Page(
         title=f"{profile.ship.name}: health of {shown}",
         kicker=f"{profile.ship.name}, {profile.ship.length_m:g} m · {shown} · {dates(start)} · "
         f"profile {profile.source or 'of its own'} · shiplog {version('shiplog')}",
-        word="sound" if not serious and not lost else "look first",
-        tone="good" if not serious and not lost else "found",
+        word=word,
+        tone=tone,
         claim=f"{counted(len(names), 'voyage')} with {usable} s of 1 Hz rows {what}; "
         f"{counted(findings, 'finding')}, {counted(lost, 'message')} lost.",
         sections=[
@@ -92,7 +96,7 @@ def _answer(reports: Sequence[VoyageReport]) -> list[Block]:
 
 def _voyages(store: Store, names: Sequence[str], reports: dict[str, VoyageReport]) -> list[Block]:
     rows = [
-        ([name], [number(r.seconds, "s", 6)], [number(r.rows, "", 9)],
+        ([name], [seconds(r.seconds)], [number(r.rows, "", 9)],
          ["-"] if r.usable_s is None else [number(r.usable_s, "s", 9)],
          ["-"] if r.windows is None else [number(r.windows, "", 9)], [number(len(r.findings))])
         for name, r in reports.items()
@@ -160,7 +164,7 @@ def _voyage(report: VoyageReport) -> list[Block]:
 
 
 def _finding(one: Finding) -> tuple[Line, ...]:
-    begin: Line = ["-"] if one.start_s is None else [number(one.start_s, "s", 6)]
-    end: Line = ["-"] if one.end_s is None else [number(one.end_s, "s", 6)]
+    begin: Line = ["-"] if one.start_s is None else [seconds(one.start_s)]
+    end: Line = ["-"] if one.end_s is None else [seconds(one.end_s)]
     kind = KNOWN.get(one.kind, one.kind.replace("_", " "))
     return [kind], [one.channel.replace("_", " ")], begin, end, [one.sentence]
