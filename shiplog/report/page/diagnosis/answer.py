@@ -20,8 +20,8 @@ STATED = 0.9  # probability, from which an answer is named
 TO_DO = {
     "none": "Nothing: the model errs as it does on its own voyages. Go on with it, within what "
     "would have been missed.",
-    "undecided": "Do not change the model yet. Record what stands under What to record next, then "
-    "diagnose again.",
+    "undecided": "Sail the test below that separates the candidates, then diagnose again. Do not "
+    "change the model yet.",
     "unknown": "Do not add a cause of the catalogue to the model. Look for what acts as said here, "
     "or write it as a cause of your own.",
     "coverage": "Record voyages in these conditions, train again, then diagnose again.",
