@@ -19,6 +19,7 @@ from pipelines.experiments.other_families.voyage import sail
 from shiplog.diagnosis.nominal import nominal_fit
 from shiplog.models.causes import CATALOGUE, Bank, ShallowWater
 
+pytestmark = pytest.mark.long  # simulators of the experiments; the product has its own tests
 FOLDER = Path(other_families.__file__).parent
 OWN = ("abkowitz", "linear_dp", "catamaran", "azimuth_ferry")
 BREEZE = Wind(3.0, 0.8)

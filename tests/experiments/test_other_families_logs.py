@@ -20,6 +20,7 @@ from pipelines.experiments.other_families.effects import Effects
 from pipelines.experiments.other_families.voyage import sail
 from shiplog.ship_profile import file as profile_file
 
+pytestmark = pytest.mark.long  # simulators of the experiments; the product has its own tests
 FOLDER = Path(other_families.__file__).parent
 START = datetime(2026, 5, 1, 6, 0, tzinfo=UTC)
 BREEZE = Wind(3.0, 0.8)
