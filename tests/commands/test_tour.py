@@ -46,7 +46,7 @@ def test_its_results_are_frames_and_files(tour):
     assert 0.0 < rest["probability"].sum() <= 1.0 + 1e-9
     assert set(found.causes["name"]) == set(found.ranking["name"][: len(found.causes)])
     assert found.verdict.sentence in str(found) and str(found) == found._repr_markdown_()
-    assert (folder / found.report).read_text(encoding="utf-8").startswith("# Diagnosis")
+    assert (folder / found.markdown).read_text(encoding="utf-8").startswith("# Diagnosis")
 
 
 def test_the_ten_lines_of_the_readme_are_calls_of_the_notebook():
