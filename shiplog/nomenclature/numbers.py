@@ -14,6 +14,15 @@ def figure(value: float, digits: int = 2) -> str:
     return f"{rounded:.0f}" if abs(rounded) >= 10.0**digits else f"{value:.{digits}g}"
 
 
+def in_minutes(degrees: float, letters: str, digits: int) -> str:
+    """A latitude or longitude as on a chart, with so many decimals of a minute: 34.5125, "NS" is
+    34°30.75'N."""
+    minutes = round(abs(degrees) * 60, digits)
+    whole, rest = divmod(minutes, 60)
+    width = digits + 3 if digits else 2
+    return f"{whole:.0f}°{rest:0{width}.{digits}f}'{letters[degrees < 0.0]}"
+
+
 def percent(share: float) -> str:
     """Whole per cent; a part that would be rounded to nothing, or to all, has a decimal."""
     if 0.0 < share < 0.005:

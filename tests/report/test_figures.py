@@ -253,3 +253,22 @@ def test_the_scale_bar_is_below_the_lowest_track(content):
     chart.draw_closeup(axes, table, far)
     bars = [line.get_ydata() for line in axes.lines if line.get_linewidth() == 2.5]
     assert max(bars[-1]) < table["x0"].min()
+
+
+@pytest.mark.parametrize("name", ["a$\\frac$b", "一号船", 'id="1.2345"'])
+def test_a_name_is_drawn_as_it_is(name):
+    """What would be a formula, a letter that the font lacks, and what looks like an attribute."""
+    content = Content(page_content.verdict(voyages=(name,)), page_content.pictures((name,)))
+    for picture in pictures.PICTURES:
+        drawn = style.svg(pictures.figure(picture, content), picture)  # warnings are errors
+        if picture in ("stretches", "windows"):
+            assert f">{name}</text>" in drawn
+
+
+def test_a_chart_has_the_coordinates_of_the_ellipsoid():
+    """At 60°N a minute of latitude is 1857 m, and one of longitude 930 m (WGS 84)."""
+    data = page_content.pictures(windows=19, latitude=60.0)  # 1900 m to the north
+    axes = pictures.figure("track", Content(page_content.verdict(), data)).axes[0]
+    latitude, longitude = (a.get_major_formatter() for a in (axes.yaxis, axes.xaxis))
+    assert (latitude(0.0, 0), latitude(1856.9, 0)) == ("60°00.0'N", "60°01.0'N")
+    assert (longitude(0.0, 0), longitude(930.0, 0)) == ("135°30.0'E", "135°31.0'E")

@@ -335,3 +335,18 @@ def test_limits_of_the_user_stand_next_to_the_prediction(tmp_path):
     assert "Against <limits>.toml: 2 of 2 broken." in said and "<limits>" not in text
     for word in ("at most 0.03 m/s", "broken", "no window was simulated", "not assessed"):
         assert word in said
+
+
+def test_the_command_of_a_moment_is_one_for_any_shell(tmp_path):
+    """Folders with blanks, and a voyage with a quotation mark, as the shell takes them apart."""
+    import shlex
+
+    folder = page_content.folder(
+        tmp_path / "d", page_content.verdict(voyages=("it's",)), page_content.pictures(("it's",)),
+        run_path="my runs/mmg", store_path="a store",
+    )  # fmt: skip
+    text = "".join(read(html.render(page.of_folder(folder))).text)
+    line = next(one for one in text.splitlines() if one.startswith("shiplog compare"))
+    assert shlex.split(line) == [
+        "shiplog", "compare", "my runs/mmg", "--store", "a store", "--at", "it's:0",
+    ]  # fmt: skip

@@ -8,6 +8,7 @@ import numpy as np
 import polars as pl
 
 from shiplog.report import colours
+from shiplog.report.figures import style
 from shiplog.report.figures.chart import legend
 from shiplog.report.figures.content import Content, Picture
 from shiplog.report.figures.picture_data import AFTER, BEFORE
@@ -105,7 +106,7 @@ def draw_limits(axes: Axes, rows: pl.DataFrame, content: Content) -> None:
     axes.set_xscale("log")
     low = min(float(share.min()), 0.1) if len(share) else 0.1
     axes.set_xlim(0.7 * low, max(3.0, 1.2 * float(share.max())) if len(share) else 3.0)
-    axes.xaxis.set_major_formatter(lambda v, _: f"{v:g}")
+    style.plain_log(axes.xaxis)
     axes.set_xlabel("smallest size that would show ÷ realistic size", loc="right")
 
 

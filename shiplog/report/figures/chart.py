@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import polars as pl
 
-from shiplog.nomenclature.numbers import figure
+from shiplog.nomenclature import frames
+from shiplog.nomenclature.numbers import figure, in_minutes
 from shiplog.report import colours
 from shiplog.report.figures import hull, style
 from shiplog.report.figures.content import Content, Picture
@@ -23,7 +24,7 @@ MOST_HULLS = {"closeup": 10, "voyage": 24}  # on one track: more would hide the 
 ROOM = {"closeup": 2.0, "voyage": 0.35}
 SHAPE = 1.15  # width of a chart over its height
 MARGIN = 0.12  # of the tracks, left free around them: the scale bar is below the lowest
-METRES_PER_DEGREE = 111_320.0  # of latitude, and of longitude at the equator
+MINUTE_M = 1852.0  # m: a minute of latitude
 MOST_WINDOWS = 100  # with a track on the chart of a voyage
 GAP_S = 2.5  # s between rows of a second each, from which a track is broken
 FEW = 1e-9
@@ -203,23 +204,18 @@ def _label(axes: Axes, data: PictureData, voyage: str) -> None:
         axes.set_xlabel("y₀ [m], east")
         axes.set_ylabel("x₀ [m], north")
         return
-    longitude = float(place["longitude"][0])
-    east = METRES_PER_DEGREE * math.cos(math.radians(latitude))
-    axes.xaxis.set_major_formatter(lambda v, _: degrees(longitude + v / east, "EW", axes, east))
+    datum = float(latitude), float(place["longitude"][0])
+    (west, east), (south, north) = axes.get_xlim(), axes.get_ylim()
+    size = max(east - west, north - south) / MINUTE_M  # minutes
+    digits = min(max(1 - math.floor(math.log10(max(size, FEW))), 1), 4)
+    axes.xaxis.set_major_formatter(
+        lambda y0, _: in_minutes(frames.geodetic(south, y0, datum)[1], "EW", digits)
+    )
     axes.yaxis.set_major_formatter(
-        lambda v, _: degrees(latitude + v / METRES_PER_DEGREE, "NS", axes, METRES_PER_DEGREE)
+        lambda x0, _: in_minutes(frames.geodetic(x0, west, datum)[0], "NS", digits)
     )
     axes.locator_params(axis="x", nbins=3)
     axes.tick_params(labelsize=6.5)
-
-
-def degrees(value: float, ends: str, axes: Axes, metres: float) -> str:
-    """As a chart has it, with as many decimals of a minute as the view's size needs: 34°49.20'N."""
-    size = max(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())) / metres * 60.0  # minutes
-    digits = min(max(1 - math.floor(math.log10(max(size, FEW))), 1), 4)
-    minutes = round(abs(value) * 60.0, digits)
-    whole, part = divmod(minutes, 60.0)
-    return f"{int(whole)}°{part:0{3 + digits}.{digits}f}'{ends[0] if value >= 0 else ends[1]}"
 
 
 def _draw_scale(axes: Axes) -> None:

@@ -67,7 +67,7 @@ class PictureData:
     current           (speed [m/s], towards [rad]) of a named current; None without one
     voyages           a row a voyage: start (ISO 8601, UTC), seconds, where x₀ = y₀ = 0 is
                       [deg; null where the log has no coordinates], mean true wind [m/s, rad, where
-                      it comes from]
+                      it comes from; null where it has no one direction]
     measured          about a row a second: the state at midship
     tracks            model (a key of `models`, or MEASURED), voyage, window, time: every window
     errors            L of each model and window (Eq. 8 of Wakita et al. 2024); null where the model

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator
+import warnings
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +21,7 @@ from shiplog.report import colours
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 WIDTH = 4.0  # inches: at 72 points an inch less than a phone's screen, so letters are no smaller
@@ -34,6 +36,7 @@ RULES: dict[Any, Any] = {
     "xtick.labelsize": 7.5, "ytick.labelsize": 7.5, "savefig.dpi": 200.0, "svg.fonttype": "none",
     "svg.hashsalt": "shiplog",  # the same file from the same data
     "path.simplify_threshold": 0.5, "savefig.facecolor": "white", "figure.facecolor": "white",
+    "text.parse_math": False,  # a name with two dollar signs is a name
 }  # fmt: skip
 KINDS = ("svg", "pdf", "png")
 # Whatever the reader has: the widths were set with DejaVu Sans, which is wider than most.
@@ -41,12 +44,30 @@ FONTS = "system-ui, -apple-system, 'Segoe UI', Roboto, 'DejaVu Sans', Arial, san
 
 
 @contextmanager
-def drawing(width: float = WIDTH, height: float = HEIGHT) -> Iterator[Figure]:
-    """An empty figure in this style; no window, and nothing of the host's settings is changed."""
+def styled(rules: Mapping[Any, Any] = RULES) -> Iterator[None]:
+    """matplotlib with these rules; the host's settings stay. A letter that the font lacks is drawn
+    as a box without a warning: in an SVG the reader's own font has it."""
     import matplotlib
+
+    with matplotlib.rc_context(dict(rules)), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing")
+        yield
+
+
+def plain_log(axis: Axis) -> None:
+    """Labels of a logarithmic axis as 100 and 1000: powers would be formulas, which no text is."""
+    from matplotlib.ticker import NullFormatter
+
+    axis.set_major_formatter(lambda value, _: f"{value:g}")
+    axis.set_minor_formatter(NullFormatter())
+
+
+@contextmanager
+def drawing(width: float = WIDTH, height: float = HEIGHT) -> Iterator[Figure]:
+    """An empty figure in this style, without a window."""
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context(RULES):
+    with styled():
         yield Figure(figsize=(width, height), layout="constrained")
 
 
@@ -55,10 +76,8 @@ def svg(figure: Figure, prefix: str) -> str:
 
     Ids of two figures would be alike, since they follow from what is drawn.
     """
-    import matplotlib
-
     made = io.StringIO()
-    with matplotlib.rc_context(RULES):
+    with styled():
         figure.savefig(made, format="svg", metadata={"Date": None, "Creator": None})
     return inline(made.getvalue(), prefix)
 
@@ -67,27 +86,29 @@ def inline(text: str, prefix: str) -> str:
     """A file of matplotlib's as such an element."""
     text = text[text.index("<svg") :]
     text = re.sub(r"\s*<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
-    text = re.sub(r'\bid="', f'id="{prefix}-', text)
-    text = re.sub(r'href="#', f'href="#{prefix}-', text)
-    text = re.sub(r"url\(#", f"url(#{prefix}-", text)
-    text = re.sub(r"(font: [^;\"]*?)'DejaVu Sans'[^;\"]*", rf"\1{FONTS}", text)
     text = re.sub(r'<svg ([^>]*?)width="[^"]*" ?', r"<svg \1", text, count=1)
     text = re.sub(r'<svg ([^>]*?)height="[^"]*" ?', r"<svg \1", text, count=1)
-    text = re.sub(r'\b(?:d|x|y|points|transform)="[^"]*"', _rounded, text)
+    text = re.sub(r"<[^>]+>", lambda tag: _tag(tag[0], prefix), text)  # and no text between tags
     return re.sub(r"\n\s*", "\n", text).strip()
 
 
+def _tag(tag: str, prefix: str) -> str:
+    """An element with ids of its own, and places to a tenth of a point: less cannot be seen."""
+    tag = re.sub(r'\bid="', f'id="{prefix}-', tag)
+    tag = re.sub(r'href="#', f'href="#{prefix}-', tag)
+    tag = re.sub(r"url\(#", f"url(#{prefix}-", tag)
+    tag = re.sub(r"(font: [^;\"]*?)'DejaVu Sans'[^;\"]*", rf"\1{FONTS}", tag)
+    return re.sub(r'\b(?:d|x|y|points|transform)="[^"]*"', _rounded, tag)
+
+
 def _rounded(attribute: re.Match[str]) -> str:
-    """Places to a tenth of a point, which cannot be seen; what is written stays as it is."""
     return re.sub(r"(\d\.\d)\d+", r"\1", attribute[0])
 
 
 def write(figure: Figure, path: Path) -> list[Path]:
     """PATH.svg, PATH.pdf and PATH.png, each whole or not at all."""
-    import matplotlib
-
     made = []
-    with matplotlib.rc_context(RULES):
+    with styled():
         for kind in KINDS:
             facts = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind, {})
             to = path.with_name(f"{path.name}.{kind}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,6 +10,7 @@ import polars as pl
 
 from shiplog.exceptions import ShiplogError
 from shiplog.report.figures.picture_data import SCHEMAS, TRAINING, TRIAL
+from shiplog.report.figures.wind import mean_wind, true_wind
 from shiplog.ship_profile.profile import Profile
 from shiplog.training.runs.load_model import Run
 from shiplog.voyages.store.store import Store
@@ -37,33 +37,21 @@ class Seconds:
 def voyages_of(
     store: Store, names: Sequence[str], rows: pl.DataFrame, profile: Profile
 ) -> pl.DataFrame:
+    """A row a voyage, as `PictureData.voyages`, of their 1 Hz rows."""
     found = []
     for name in names:
         start, place = store.origin(name)
         own = rows.filter(pl.col("voyage") == name)
-        north, east = _true_wind(own) if profile.has_wind and len(own) else (None, None)
-        speed = towards = None
-        if north is not None and east is not None:
-            x, y = float(np.nanmean(north)), float(np.nanmean(east))
-            speed, towards = math.hypot(x, y), math.atan2(y, x)
-        seconds = float(own["elapsed"].max() or 0.0) if len(own) else 0.0  # type: ignore[arg-type]
-        found.append((name, start, seconds, *(place or (None, None)), speed, towards))
+        wind = mean_wind(*_true_wind(own)) if profile.has_wind else None
+        arrow = (wind.speed, wind.comes_from) if wind is not None and wind.steady else (None, None)
+        seconds = float(own["elapsed"].to_numpy().max()) if len(own) else 0.0
+        found.append((name, start, seconds, *(place or (None, None)), *arrow))
     return pl.DataFrame(found, SCHEMAS["voyages"], orient="row")
 
 
 def _true_wind(rows: pl.DataFrame) -> tuple[np.ndarray, np.ndarray]:
-    """Where the wind over ground comes from, along x₀ and y₀ [m/s]:
-
-    R(ψ) (apparent wind, where it comes from, less the ship's own velocity)
-    """
-    speed, angle, surge, sway, psi = (
-        rows[k].cast(pl.Float64).to_numpy() for k in (*WIND, "surge", "sway", "heading")
-    )
-    ahead, starboard = speed * np.cos(angle) - surge, speed * np.sin(angle) - sway
-    return (
-        ahead * np.cos(psi) - starboard * np.sin(psi),
-        ahead * np.sin(psi) + starboard * np.cos(psi),
-    )
+    columns = (*WIND, "surge", "sway", "heading")
+    return true_wind(*(rows[k].cast(pl.Float64).to_numpy() for k in columns))
 
 
 def conditions(run: Run | None, rows: pl.DataFrame, profile: Profile) -> pl.DataFrame:

@@ -8,6 +8,7 @@ import polars as pl
 
 from shiplog.nomenclature.numbers import counted
 from shiplog.report import colours
+from shiplog.report.figures import style
 from shiplog.report.figures.chart import legend
 from shiplog.report.figures.content import Content, Picture
 
@@ -56,6 +57,7 @@ def draw(axes: Axes, rows: pl.DataFrame, content: Content) -> None:
             axes.plot(own["place"].to_numpy(), own["loss"].to_numpy(), "o", color=colour,
                       markersize=3.5, label=label)  # fmt: skip
     axes.set_yscale("log")
+    style.plain_log(axes.yaxis)
     firsts = rows.group_by("voyage", maintain_order=True).agg(pl.col("place").min())
     places, names, flat = ticks(firsts["place"].to_list(), firsts["voyage"].to_list(),
                                 int(rows["place"].to_numpy().max()) + 1)  # fmt: skip

@@ -6,6 +6,7 @@ stands in the JSON of a result is a `Number`, so that a reader, and a test, find
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -107,6 +108,13 @@ class Command:
     """To copy into a terminal."""
 
     text: str
+
+
+def moment(runs: Sequence[str], store: str, voyage: str, seconds: float) -> Command:
+    """Opens the comparison of runs at a moment of a voyage."""
+    called = " ".join(shlex.quote(run) for run in runs)
+    at = f"{voyage}:{seconds:.0f}".replace("'", "'\\''")
+    return Command(f"shiplog compare {called} --store {shlex.quote(store)} --at '{at}'")
 
 
 @dataclass(frozen=True, slots=True)

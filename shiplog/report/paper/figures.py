@@ -11,6 +11,7 @@ import numpy as np
 import polars as pl
 
 from shiplog.nomenclature import channels
+from shiplog.report.figures.style import plain_log
 from shiplog.report.paper.style import COLOURS, MEASURED, figure, named
 from shiplog.voyages.windows.wind_histogram import ANGLE_BIN
 
@@ -42,6 +43,7 @@ def histograms(table: pl.DataFrame, units: dict[str, str], path: Path) -> None:
                 axis.stairs(own["seconds"].to_numpy(), edges, color=COLOURS[str(name)],
                             label=named(str(name)), linewidth=1.0)  # fmt: skip
             axis.set_yscale("log")
+            plain_log(axis.yaxis)
             axis.set_ylim(bottom=0.7)
             axis.set_xlabel(LABELS.get(channel, f"{channel} [{units.get(channel, '1')}]"))
         for axis in axes[len(names) :]:
@@ -74,7 +76,7 @@ def wind(table: pl.DataFrame, path: Path) -> None:
             axis.set_xticks([0, 90, 180, 270, 360])
         axes[0].set_ylabel("apparent wind speed [m/s]")
         drawn.supxlabel("apparent wind angle [deg from the bow]", fontsize=8)
-        drawn.colorbar(mesh, ax=axes, label="seconds")
+        plain_log(drawn.colorbar(mesh, ax=axes, label="seconds").ax.yaxis)
 
 
 def validation(histories: pl.DataFrame, path: Path) -> None:
@@ -94,6 +96,7 @@ def validation(histories: pl.DataFrame, path: Path) -> None:
             for _, one in own.group_by("seed", maintain_order=True):
                 axis.plot(one["epoch"], one["smoothed"], color=COLOURS[name], linewidth=0.6)
             axis.set_yscale("log")
+            plain_log(axis.yaxis)
             axis.set_title(named(name), color=COLOURS[name])
         axes[0].xaxis.set_major_locator(MaxNLocator(EPOCH_TICKS))
         axes[0].xaxis.set_major_formatter(EngFormatter(sep=""))
@@ -129,6 +132,7 @@ def test(losses: pl.DataFrame, baselines: dict[str, float], path: Path) -> None:
             axis.annotate(name, (1.0, value), xycoords=("axes fraction", "data"), ha="right",
                           va="bottom", fontsize=6.5, color="#555555")  # fmt: skip
         axis.set_yscale("log")
+        plain_log(axis.yaxis)
         axis.set_xticks(range(len(sets)), ticks)
         axis.set_ylabel("test L (points: seeds, bar: mean)")
 
@@ -172,6 +176,7 @@ def states(rollouts: pl.DataFrame, measured: pl.DataFrame, pair: Sequence[str], 
                 _band(axis, rollouts.filter(pl.col("set") == of), name, factor, of)
             axis.set_ylabel(LABELS[name])
         axes[-1].set_yscale("log")
+        plain_log(axes[-1].yaxis)
         axes[-1].set_ylim(bottom=LEAST_ERROR)
         starts = rollouts.group_by("window").agg(pl.col("time").min())["time"].to_list()
         for axis in axes:

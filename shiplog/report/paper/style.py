@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from shiplog.machine import files
+from shiplog.report.figures import style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,12 +21,10 @@ COLOURS = {  # Okabe and Ito (2008), safe for colour-blind eyes; their yellow da
 }  # fmt: skip
 NAMES = {"sli2xjit2": "sli2 × jit2", "sli10xjit10": "sli10 × jit10"}
 MEASURED = "#9A9A9A"
-RULES: dict[Any, Any] = {
-    "font.size": 8.0, "font.family": "sans-serif", "axes.linewidth": 0.6, "axes.titlesize": 8.0,
-    "axes.spines.top": False, "axes.spines.right": False, "lines.linewidth": 0.9,
-    "legend.frameon": False, "legend.fontsize": 7.0, "xtick.labelsize": 7.0,
-    "ytick.labelsize": 7.0, "savefig.dpi": 200.0, "svg.fonttype": "none",
-    "svg.hashsalt": "shiplog",  # the same file from the same data
+RULES: dict[Any, Any] = style.RULES | {
+    "font.size": 8.0, "axes.titlesize": 8.0, "axes.titleweight": "normal",
+    "axes.titlelocation": "center", "lines.linewidth": 0.9, "legend.fontsize": 7.0,
+    "xtick.labelsize": 7.0, "ytick.labelsize": 7.0,
 }  # fmt: skip
 
 
@@ -37,19 +36,13 @@ def named(of: str) -> str:
 @contextmanager
 def figure(height: float, path: Path) -> Iterator[Figure]:
     """A figure of a page's width, `height` inches, written as PATH.svg and PATH.png."""
-    import matplotlib
+    from matplotlib.figure import Figure
 
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    with matplotlib.rc_context(RULES):
-        drawn = pyplot.figure(figsize=(WIDTH, height), layout="constrained")
-        try:
-            yield drawn
-            for kind in ("svg", "png"):
-                facts = {"Date": None} if kind == "svg" else {}
-                with files.whole(path.with_suffix(f".{kind}")) as partial:
-                    drawn.savefig(partial, format=kind, metadata=facts)
-                drawn.set_layout_engine("none")  # laid out once, and alike in both files
-        finally:
-            pyplot.close(drawn)
+    with style.styled(RULES):
+        drawn = Figure(figsize=(WIDTH, height), layout="constrained")
+        yield drawn
+        for kind in ("svg", "png"):
+            facts = {"Date": None} if kind == "svg" else {}
+            with files.whole(path.with_suffix(f".{kind}")) as partial:
+                drawn.savefig(partial, format=kind, metadata=facts)
+            drawn.set_layout_engine("none")  # laid out once, and alike in both files

@@ -15,11 +15,12 @@ import numpy as np
 import rerun as rr
 
 from shiplog.nomenclature import frames
+from shiplog.nomenclature.numbers import in_minutes
 from shiplog.report import colours
+from shiplog.report.figures.wind import Wind
 from shiplog.report.viewer import style, surroundings
 from shiplog.report.viewer.comparison_data import Current
 from shiplog.report.viewer.style import entity
-from shiplog.report.viewer.surroundings import Wind
 
 # Words keep their size on the screen whatever the chart shows, so room for them is planned in
 # points, of a screen of 1920 by 1080 with the window as large; on another one all shrinks alike.
@@ -31,7 +32,6 @@ LETTER = 7.2  # points: a letter is wide
 ARROW = 55.0  # points: an arrow is long
 LINE = 26.0  # points: from a place to the word below it
 MINUTE_M = 1852.0  # m: a minute of latitude
-DEGREE = 60  # minutes
 
 Ends = tuple[float, float]
 
@@ -150,14 +150,6 @@ def _coordinates(
         *(in_minutes(degrees, "EW", digits) for degrees in longitudes),
         *(in_minutes(degrees, "NS", digits) for degrees in latitudes),
     ]
-
-
-def in_minutes(degrees: float, letters: str, digits: int) -> str:
-    """As on a chart: 34.5125, "NS" → 34°30.75'N."""
-    minutes = round(abs(degrees) * DEGREE, digits)
-    whole, rest = divmod(minutes, DEGREE)
-    width = digits + 3 if digits else 2
-    return f"{whole:.0f}°{rest:0{width}.{digits}f}'{letters[degrees < 0.0]}"
 
 
 def send_arrows(

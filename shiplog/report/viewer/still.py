@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +12,7 @@ import polars as pl
 
 from shiplog.machine import files
 from shiplog.report import colours
+from shiplog.report.figures import style
 from shiplog.report.viewer import display, surroundings, tracking
 from shiplog.report.viewer.comparison_data import ComparisonData
 from shiplog.report.viewer.display import Drawn
@@ -26,27 +26,18 @@ KINDS = (".png", ".svg")
 SHAPE = 1.25  # width of a chart over its height, as the grid leaves it
 POINTS = 1500  # of a line: more than its width on a screen or a page
 MOST_HULLS = 24
-RULES: dict[Any, Any] = {
-    "font.size": 8.5, "font.family": "sans-serif", "font.sans-serif": ["DejaVu Sans"],
-    "axes.linewidth": 0.6, "axes.titlesize": 9.0, "axes.titlelocation": "left",
-    "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False,
-    "savefig.dpi": 150.0, "svg.fonttype": "none",
-    "svg.hashsalt": "shiplog",  # the same file from the same data
-    "text.parse_math": False,  # a name with two dollar signs is a name
-}  # fmt: skip
+RULES: dict[Any, Any] = style.RULES | {"savefig.dpi": 150.0}  # a picture for mail
 
 
 def write(comparison: ComparisonData, path: Path) -> None:
     """PATH, a .png or .svg: whole or not at all, without a window."""
-    import matplotlib
     from matplotlib.figure import Figure
 
     drawn = display.drawn(comparison)
     voyages = drawn.voyages if drawn.moment is None else [drawn.moment.voyage]
     kind = path.suffix.lower().removeprefix(".")
     facts = {"Date": None} if kind == "svg" else {}
-    with matplotlib.rc_context(RULES), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Glyph .* missing")  # a box is drawn instead
+    with style.styled(RULES):
         figure = Figure(figsize=(WIDTH, ROW * len(voyages) + 0.5), layout="constrained")
         _draw(figure, drawn, voyages)
         with files.whole(path) as partial:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from shiplog.report.page.blocks import Block, Command, Fold, Gallery, Grid, Paragraph, seconds
+from shiplog.report.page.blocks import Block, Fold, Gallery, Grid, Paragraph, seconds
 from shiplog.report.page.diagnosis.source import Source
-from shiplog.report.page.diagnosis.where import moment
+from shiplog.report.page.diagnosis.where import opening
 
 MOST_ROWS = 40  # of a table; the JSON has them all
 
@@ -25,7 +25,7 @@ def blocks(source: Source) -> list[Block]:
         found.append(
             Paragraph(["The first of them in the recording; for another, change the end:"])
         )
-        found.append(Command(moment(source, first["voyage"], first["start_s"])))
+        found.append(opening(source, first["voyage"], first["start_s"]))
     else:
         found.append(Paragraph(["No stretch was left out, or is outside the training data."]))
     if len(verdict["intervals"]) > MOST_ROWS:

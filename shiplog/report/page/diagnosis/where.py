@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from shiplog.report.figures.chart import closeup_window
-from shiplog.report.page.blocks import Block, Command, Fold, Gallery, Paragraph
+from shiplog.report.page.blocks import Block, Command, Fold, Gallery, Paragraph, moment
 from shiplog.report.page.diagnosis.source import Source
 
 FIRST = ("closeup", "position_error", "heading_error", "channels")
@@ -19,7 +19,7 @@ def blocks(source: Source) -> list[Block]:
         voyage, window = chosen
         own = source.content.data.errors.filter(voyage=voyage, window=window).head(1)
         found.append(Paragraph(["See this window in the recording:"]))
-        found.append(Command(moment(source, voyage, float(own["time"][0]))))
+        found.append(opening(source, voyage, float(own["time"][0])))
     names = source.content.data.names
     tracks = [one for name in names[:MOST_TRACKS] if (one := source.drawn("track", name))]
     if tracks:
@@ -28,9 +28,7 @@ def blocks(source: Source) -> list[Block]:
     return found
 
 
-def moment(source: Source, voyage: str, seconds: float) -> str:
-    """The command that opens the comparison at a moment."""
-    name = voyage.replace("'", "'\\''")
-    runs = source.provenance.get("run_path") or source.subject["run"]
-    store = source.provenance.get("store_path") or "store"
-    return f"shiplog compare {runs} --store {store} --at '{name}:{seconds:.0f}'"
+def opening(source: Source, voyage: str, seconds: float) -> Command:
+    """The command that opens this run's comparison at a moment."""
+    run = source.provenance.get("run_path") or source.subject["run"]
+    return moment([run], source.provenance.get("store_path") or "store", voyage, seconds)

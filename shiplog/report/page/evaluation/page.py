@@ -16,7 +16,6 @@ from shiplog.report.figures.content import Content
 from shiplog.report.page.blocks import (
     Answers,
     Block,
-    Command,
     Drawn,
     Fold,
     Gallery,
@@ -27,6 +26,7 @@ from shiplog.report.page.blocks import (
     Page,
     Paragraph,
     Section,
+    moment,
     number,
     seconds,
     share,
@@ -229,15 +229,10 @@ def _voyages(source: Source) -> list[Block]:
         titles = ("voyage", "from", "L", "why")
         found.append(Grid(titles, lines, titles[1:3], "Worst windows"))
         found.append(Paragraph(["The worst of them in the recording:"]))
-        found.append(Command(moment(source.subject, worst[0]["voyage"], worst[0]["start_s"])))
+        runs = [run["path"] for run in source.subject["runs"]]
+        store, first = source.subject["store"], worst[0]
+        found.append(moment(runs, store, first["voyage"], first["start_s"]))
     return found
-
-
-def moment(subject: Mapping[str, Any], voyage: str, seconds: float) -> str:
-    """The command that opens the comparison at a moment."""
-    name = voyage.replace("'", "'\\''")
-    runs = " ".join(run["path"] for run in subject["runs"])
-    return f"shiplog compare {runs} --store {subject['store']} --at '{name}:{seconds:.0f}'"
 
 
 def _execution(source: Source) -> list[Block]:
