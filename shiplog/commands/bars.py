@@ -24,7 +24,7 @@ from shiplog.nomenclature.numbers import counted
 
 log = logging.getLogger(__name__)
 
-LEAST_BAR, MOST_BAR, WORDS = 4, 40, 50  # letters of a bar, and of what stands beside it
+LEAST_BAR, MOST_BAR, WORDS = 4, 40, 50  # letters of a bar, and of what stands next to it
 LINE_S = 30.0  # between two lines where there is no terminal
 LEAST_DONE = 0.02  # share of the work, below which no time left is given: it would be hours off
 # Of a log ingested or a table converted: a first guess that the finished logs correct.

@@ -113,7 +113,7 @@ def baseline_losses(cut: Windows) -> dict[str, float]:
     """Mean L of both baselines on the windows that one of them is fitted to."""
     fitted = baselines.least_squares(cut)
     return {
-        name: float(scoring.score(model, cut).errors["loss"].mean())  # type: ignore[arg-type]
+        name: float(scoring.score(model, cut).errors["loss"].to_numpy().mean())
         for name, model in (("hold", baselines.hold), ("least_squares", fitted))
     }
 

@@ -51,5 +51,5 @@ def reserved() -> int:
     """Bytes of data and stacks that this process has reserved; 0 where that is not known."""
     if sys.platform != "linux":
         return 0
-    with open("/proc/self/statm") as told:
-        return int(told.read().split()[5]) * os.sysconf("SC_PAGESIZE")
+    with open("/proc/self/statm") as pages:
+        return int(pages.read().split()[5]) * os.sysconf("SC_PAGESIZE")

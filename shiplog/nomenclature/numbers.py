@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+NINETY_SPREADS = 1.645  # standard deviations to either end of a normal distribution's middle 90 %
+
 
 def counted(number: int, noun: str) -> str:
     """`1 window`, `2 windows`."""

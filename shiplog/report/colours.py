@@ -30,7 +30,7 @@ BANK: Colour = (140, 110, 70, 255)
 GRID: Colour = (222, 226, 230, 255)
 ZERO: Colour = (190, 196, 202, 255)
 TEXT: Colour = (30, 30, 30, 255)
-TRAINING: Colour = (150, 160, 175, 255)  # what a model was trained on, beside the trial
+TRAINING: Colour = (150, 160, 175, 255)  # what a model was trained on, next to the trial
 TRIAL: Colour = (90, 90, 90, 255)
 # No hue of a model, which would look like that model's. Legends lie on a dark ground or on a light
 # one, as the reader's viewer is set: each of these has a contrast of 3 with either.

@@ -9,13 +9,13 @@ folder has matplotlib's imports in it, the others have not.
 
 from __future__ import annotations
 
+import importlib
 import resource
 import sys
 import tempfile
 import time
 from pathlib import Path
 
-import shiplog.commands.diagnose  # noqa: F401  # what a diagnosis has loaded already
 from pipelines.experiments.benchmarks import machine
 
 ROUNDS = 3
@@ -33,6 +33,7 @@ def page_of(diagnosis: Path, to: Path) -> tuple[float, int]:
 
 def main(folders: list[Path]) -> None:
     print(machine.processor())
+    importlib.import_module("shiplog.commands.diagnose")  # what a diagnosis has loaded already
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     with tempfile.TemporaryDirectory() as temporary:
         for folder in folders:

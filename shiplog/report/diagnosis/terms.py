@@ -10,7 +10,7 @@ TERMS = (
     ("log Bayes factor, nats", "How much more probable the data are with a cause than without "
      "it, as a natural logarithm: 3 is 20 to 1, 7 is 1000 to 1."),
     ("90 % interval", "It contains the true value nine times in ten."),
-    ("cannot be told from", "Two causes change these voyages in the same way, within their noise."),
+    ("cannot tell it from", "Two causes change these voyages in the same way, within their noise."),
     ("outside the catalogue", "Something acts that none of the known causes explains; the word in "
      "brackets is what it depends on."),
     ("missing force", "The force by which the model's acceleration differs from the ship's."),

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import polars as pl
 
+from shiplog.diagnosis.thresholds import STATED
 from shiplog.report import colours
 from shiplog.report.figures import style
 from shiplog.report.figures.chart import legend
@@ -18,8 +19,7 @@ if TYPE_CHECKING:
 
 MOST_RANKED = 8
 FEWEST_ROWS = 2  # for which there is room: a bar alone is no thicker than one of two
-STATED = 0.9  # probability, from which an answer is named
-BEYOND = 30.0  # realistic sizes: a cause that needs more is not detectable
+HOPELESS = 30.0  # realistic sizes, beyond which a cause counts as undetectable
 
 
 def spoken(name: str, of: str | None = None) -> str:
@@ -95,7 +95,7 @@ def size_in_words(parameters: dict) -> str:
 
 
 def draw_limits(axes: Axes, rows: pl.DataFrame, content: Content) -> None:
-    share = np.minimum(rows["share"].to_numpy(), BEYOND)
+    share = np.minimum(rows["share"].to_numpy(), HOPELESS)
     ink = [colours.web(colours.TRAINING if v <= 1.0 else colours.ORANGE) for v in share]
     axes.barh(np.arange(len(rows)), share, color=ink, height=0.65)
     axes.axvline(1.0, color=colours.web(colours.TEXT), linewidth=1.0)
@@ -148,7 +148,7 @@ def draw_channels(axes: Axes, rows: pl.DataFrame, content: Content) -> None:
         bars = axes.barh(place + shift, values, color=colour, height=0.36, label=label)
         axes.bar_label(bars, [f"{100 * v:.0f} %" for v in values], padding=3, fontsize=7.0)
     _names(axes, [str(c).replace("_", " ") for c in rows["channel"].to_list()])
-    axes.set_xlim(0.0, 1.25 * max(float(rows[BEFORE].max() or 0.0), 0.1))  # type: ignore[arg-type]
+    axes.set_xlim(0.0, 1.25 * max(*rows[BEFORE].to_list(), 0.1))
     axes.xaxis.set_major_formatter(lambda v, _: f"{100 * v:.0f} %")
     axes.set_xlabel("share of the error L before")
     axes.legend(loc="lower right")

@@ -39,9 +39,12 @@ def wind_table(content: Content) -> pl.DataFrame:
 
 
 def draw_wind(axes: Axes, rows: pl.DataFrame, content: Content) -> None:
-    """Each sector as long as the wind's mean speed, and as dark as the share of the time."""
-    axes.set_theta_zero_location("N")  # type: ignore[attr-defined]  # of polar axes
-    axes.set_theta_direction(-1)  # type: ignore[attr-defined]
+    """Each sector as long as the mean speed of the wind from there."""
+    from matplotlib.projections.polar import PolarAxes
+
+    assert isinstance(axes, PolarAxes)
+    axes.set_theta_zero_location("N")
+    axes.set_theta_direction(-1)
     for campaign, colour in CAMPAIGNS.items():
         own = rows.filter(pl.col("campaign") == campaign)
         if own.is_empty():

@@ -79,7 +79,7 @@ def draw(axes: Axes, rows: pl.DataFrame, content: Content, of: str) -> None:
         elapsed, low, median, high = (
             own[k].to_numpy() for k in ("elapsed", "low", "median", "high")
         )
-        if own["windows"].max() >= LEAST_WINDOWS:  # type: ignore[operator]  # whole numbers
+        if own["windows"].to_numpy().max() >= LEAST_WINDOWS:
             axes.fill_between(elapsed, low, high, color=colour, alpha=0.18, linewidth=0)
         axes.plot(elapsed, median, color=colour, linewidth=1.8, label=label)
     axes.set_xlabel("time since the start of the window [s]")

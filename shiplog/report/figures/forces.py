@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import polars as pl
 
+from shiplog.nomenclature.numbers import NINETY_SPREADS
 from shiplog.report import colours
 from shiplog.report.figures import style
 from shiplog.report.figures.content import Content, Picture
@@ -15,7 +16,6 @@ from shiplog.report.figures.content import Content, Picture
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-NINETY_SPREADS = 1.645  # standard deviations to either end of a 90 % interval
 GAP_S = 5.0  # s between nodes, from which a line is broken
 AXES = {  # channel → what pushes, its unit, what positive is
     "surge": ("surge force", "N", "ahead"),

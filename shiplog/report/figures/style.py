@@ -139,6 +139,15 @@ def thinned(time: np.ndarray, *values: np.ndarray) -> list[np.ndarray]:
     return [time[rows], *(value[rows] for value in values)]
 
 
+def short(name: str, most: int) -> str:
+    """So many letters at most; of a long name the middle is left out: recorders' names differ at
+    their ends."""
+    if len(name) <= most:
+        return name
+    head = 2 * (most - 1) // 5
+    return f"{name[:head]}…{name[head + 1 - most :]}"
+
+
 def empty(axes: Axes, why: str) -> None:
     """Axes that say why nothing is drawn on them."""
     axes.set_axis_off()

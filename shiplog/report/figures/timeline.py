@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,6 +10,7 @@ import polars as pl
 
 from shiplog.nomenclature.numbers import counted
 from shiplog.report import colours
+from shiplog.report.figures import style
 from shiplog.report.figures.content import Content, Picture
 
 if TYPE_CHECKING:
@@ -21,9 +23,10 @@ KINDS = {  # of an interval → its words and colour
 }
 OTHERS = (colours.BLUE, colours.GREEN, colours.PURPLE, colours.TEXT, colours.SKY)  # of other kinds
 MOST_KINDS = 8  # in a legend
-LONGEST = 26  # letters of a name beside the axis: more would leave no room for the voyages
+LONGEST = 24  # letters of a name at the axis: more would leave no room for the voyages
 SHORTEST = 0.005  # of the axis, that a stretch is drawn with: a shorter one could not be seen
 WHOLE = 0.95  # of a voyage: a finding of as much is one of the whole voyage
+short = partial(style.short, most=LONGEST)
 SCHEMA = {
     "voyage": pl.String, "kind": pl.String, "start_s": pl.Float64, "end_s": pl.Float64,
 }  # fmt: skip
@@ -73,11 +76,6 @@ def draw(axes: Axes, rows: pl.DataFrame, content: Content) -> None:
     if seen:
         axes.legend(loc="lower center", bbox_to_anchor=(0.45, 1.0), ncols=3, columnspacing=1.0,
                     handlelength=1.0)  # fmt: skip
-
-
-def short(name: str) -> str:
-    """The middle of a long name is left out: names of recorders differ at their ends."""
-    return name if len(name) <= LONGEST else f"{name[:9]}…{name[-14:]}"
 
 
 def words(rows: pl.DataFrame, content: Content) -> str:

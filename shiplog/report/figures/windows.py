@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 LETTER = 0.022  # of the axis, that a letter of a name takes, with what is left free of it
 SLANTED = 0.07  # of the axis, that a slanted name takes
+LONGEST = 16  # letters of a name under the axis
 MOST_WINDOWS = 300  # that are drawn
 
 
@@ -72,7 +73,7 @@ def draw(axes: Axes, rows: pl.DataFrame, content: Content) -> None:
 def ticks(places: list[int], names: list[str], windows: int) -> tuple[list[int], list[str], bool]:
     """Voyages that have their name under the axis, so that none overlaps the next, and whether the
     names lie flat: they do where each ends before the next begins."""
-    short = [_short(name) for name in names]
+    short = [style.short(name, LONGEST) for name in names]
     flat = all(
         (after - before) / windows > LETTER * len(name)
         for before, after, name in zip(places, places[1:], short, strict=False)
@@ -84,10 +85,6 @@ def ticks(places: list[int], names: list[str], windows: int) -> tuple[list[int],
         if not kept or (place - places[kept[-1]]) / windows >= SLANTED:
             kept.append(i)
     return [places[i] for i in kept], [short[i] for i in kept], False
-
-
-def _short(name: str) -> str:
-    return name if len(name) <= 16 else f"{name[:7]}…{name[-8:]}"
 
 
 def words(rows: pl.DataFrame, content: Content) -> str:

@@ -95,9 +95,8 @@ def _window_line(kind: Kind, of: Scored) -> list[str]:
         high = value * (1.0 + WITHOUT_INTERVAL) ** (2 if kind.key.startswith("loss") else 1)
     else:
         high = value + MARGIN * (measured.high - value)
-    return [
-        f"{kind.key} = {_rounded(high, up=True)}  # today: {_told(measured)} {kind.unit}".rstrip()
-    ]
+    today = f"{_in_words(measured)} {kind.unit}".rstrip()
+    return [f"{kind.key} = {_rounded(high, up=True)}  # today: {today}"]
 
 
 def _share_line(key: str, measured: Measured, margin: float) -> list[str]:
@@ -107,8 +106,8 @@ def _share_line(key: str, measured: Measured, margin: float) -> list[str]:
         return [f"# {key}: {measured.reason}"]
     low = value - margin if measured.low is None else value - MARGIN * (value - measured.low)
     if low < LEAST_SHARE:
-        return [f"# {key}: today {_told(measured)}, too little for a limit"]
-    return [f"{key} = {_rounded(low, up=False)}  # today: {_told(measured)}"]
+        return [f"# {key}: today {_in_words(measured)}, too little for a limit"]
+    return [f"{key} = {_rounded(low, up=False)}  # today: {_in_words(measured)}"]
 
 
 def _sizes(verdict: Diagnosed, own: Sequence[Cause], windless: bool) -> list[str]:
@@ -122,7 +121,7 @@ def _sizes(verdict: Diagnosed, own: Sequence[Cause], windless: bool) -> list[str
             if size.value is not None and size.high is not None:
                 far = size.value + MARGIN * (size.high - size.value)
                 unit = cause_names.unit_of(one.name, parameter, own)
-                why = f"today: {_told(size)} {unit}".rstrip()
+                why = f"today: {_in_words(size)} {unit}".rstrip()
                 lines.append(f"{_key(_label(one))}.{parameter} = {_rounded(far, up=True)}  # {why}")
     for one in verdict.limits:
         if any((one.name, one.part) == (known.name, known.part) for known in there):
@@ -132,9 +131,9 @@ def _sizes(verdict: Diagnosed, own: Sequence[Cause], windless: bool) -> list[str
         for parameter in cause_names.sized(one.name, list(one.parameters), own):
             if least := detectable_size(one, parameter):
                 unit = cause_names.unit_of(one.name, parameter, own)
-                told = f"{figure(least, 3)} {unit}".rstrip()
+                least_size = f"{figure(least, 3)} {unit}".rstrip()
                 lines.append(
-                    f"# {_key(_label(one))}.{parameter}: not found, detectable from {told}"
+                    f"# {_key(_label(one))}.{parameter}: not found, detectable from {least_size}"
                 )
     return lines
 
@@ -156,7 +155,7 @@ def _rounded(value: float, up: bool) -> str:
     return f"{whole * step:.12g}"
 
 
-def _told(measured: Measured) -> str:
+def _in_words(measured: Measured) -> str:
     value = figure(measured.value or 0.0, 3)
     if measured.low is None or measured.high is None:
         return value

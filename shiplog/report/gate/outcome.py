@@ -10,7 +10,7 @@ from shiplog.nomenclature.numbers import figure
 from shiplog.report.evaluation.text_table import one_line
 
 State = Literal["holds", "broken", "not assessed"]
-DIGITS = 3  # significant ones of a figure, unless the limit needs more to be told from it
+DIGITS = 3  # significant ones of a figure, unless it needs more to differ from the limit
 MOST_DIGITS = 12
 
 
@@ -67,10 +67,10 @@ class Outcome:
         if m.words or m.value is None:
             return m.words
         limit = self.limit if isinstance(self.limit, float) else None
-        text = f"{_told(m.value, limit)} {self.unit}".rstrip()
+        text = f"{_in_words(m.value, limit)} {self.unit}".rstrip()
         if m.low is None or m.high is None:
             return text
-        return f"{text} ({_told(m.low, None)} to {_told(m.high, limit)})"
+        return f"{text} ({_in_words(m.low, None)} to {_in_words(m.high, limit)})"
 
     @property
     def line(self) -> str:
@@ -119,7 +119,7 @@ def of_number(
     return Outcome(section, key, name, bound, limit, unit, measured, state)
 
 
-def _told(value: float, limit: float | None) -> str:
+def _in_words(value: float, limit: float | None) -> str:
     """With as many digits as tell it from the limit: 4.002 is not `4` where 4 is the limit."""
     if not math.isfinite(value):
         return "diverged"

@@ -6,10 +6,12 @@ stands in the JSON of a result is a `Number`, so that a reader, and a test, find
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from shiplog.diagnosis.thresholds import STATED
 from shiplog.nomenclature.numbers import figure, percent
 
 
@@ -43,10 +45,17 @@ def share(value: float) -> Number:
     return Number(value, percent(value))
 
 
+def or_diverged(value: float | None, unit: str = "") -> Line:
+    """A figure of an evaluation, which has none where the model diverged."""
+    return ["diverged"] if value is None else [number(value, unit)]
+
+
 def probability(value: float) -> Number:
-    """With two decimals; what is below 0.9 is not rounded up to it."""
+    """With two decimals; what is too little to be named is not rounded up to that."""
     text = f"{value:.2f}"
-    return Number(value, "0.89" if value < 0.9 <= float(text) else text)
+    if value < STATED <= float(text):
+        text = f"{math.floor(100.0 * value) / 100.0:.2f}"
+    return Number(value, text)
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ WHITE = [255, 255, 255, 255]  # the ground of the pictures
 
 
 def write(title: str, text: str, pictures: Mapping[str, Path], path: Path) -> None:
-    """An .rrd with the Markdown `text` beside all pictures, name → PNG file, and a tab for each."""
+    """An .rrd with the Markdown `text` and all pictures, name → PNG file, and a tab for each."""
     with whole(title, blueprint(list(pictures)), path) as recording:
         recording.log("text", rr.TextDocument(inert(text), media_type="text/markdown"), static=True)
         for number, picture in enumerate(pictures.values()):

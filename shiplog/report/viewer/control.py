@@ -1,4 +1,4 @@
-"""A viewer that runs, told where its time cursor is to stand: a recording cannot say it."""
+"""Sets the time cursor of a viewer that runs: a recording cannot hold it."""
 
 from __future__ import annotations
 

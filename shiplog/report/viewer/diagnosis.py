@@ -11,6 +11,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from shiplog.nomenclature import channels
+from shiplog.nomenclature.numbers import NINETY_SPREADS
 from shiplog.report import colours
 from shiplog.report.evaluation.text_table import inert
 from shiplog.report.viewer import chart, display, forces, style, timeline, tracking, trajectory
@@ -19,7 +20,6 @@ from shiplog.report.viewer.diagnosis_data import AFTER, BEFORE, Exhibit
 from shiplog.report.viewer.display import Drawn
 from shiplog.report.viewer.style import entity
 
-BAND_DEVIATIONS = 1.645  # standard deviations of a 90 % band
 LACKS = "model lacks (black)"  # a dark dot does not show on a dark legend
 ROOM = 1.0  # sizes of the measured track that a simulated one is followed beyond it
 AXIS_OF_CHANNEL = dict(zip((c.name for c in channels.VELOCITY), forces.FORCE_AXES, strict=True))
@@ -112,8 +112,8 @@ def _components(exhibit: Exhibit) -> pl.DataFrame:
     """A row an instant and part: what the model lacks, the ends of its band, what was named."""
     part = {
         LACKS: pl.col("force"),
-        "low": pl.col("force") - BAND_DEVIATIONS * pl.col("sd"),
-        "high": pl.col("force") + BAND_DEVIATIONS * pl.col("sd"),
+        "low": pl.col("force") - NINETY_SPREADS * pl.col("sd"),
+        "high": pl.col("force") + NINETY_SPREADS * pl.col("sd"),
         "named": pl.col("named"),
     }
     return pl.concat(

@@ -109,7 +109,7 @@ def _web_program() -> dict[str, bytes]:
     """Rerun's viewer for browsers, which only its own server hands out: asked, and ended."""
     with tempfile.TemporaryFile() as output:
         port = free_port()
-        # told of a recording elsewhere, which it never asks for, it serves nothing but its page
+        # given a recording elsewhere, which it never asks for, it serves nothing but its page
         arguments = ["--serve-web", "--web-viewer-port", str(port), f"http://{HOST}/none.rrd"]
         process = start(arguments, output, supervised=True)
         try:

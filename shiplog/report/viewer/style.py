@@ -1,4 +1,4 @@
-"""How Rerun is told of a colour, a time, a name and a light ground."""
+"""Colours, times, names and a light ground as Rerun takes them."""
 
 from __future__ import annotations
 

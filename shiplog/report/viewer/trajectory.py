@@ -5,7 +5,6 @@ Rerun's 2D views have y pointing down, so a point is drawn at (y₀, -x₀).
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -15,15 +14,13 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from shiplog.report import colours
+from shiplog.report.figures import hull
 from shiplog.report.viewer import chart, display, style, surroundings
 from shiplog.report.viewer.comparison_data import Moment
 from shiplog.report.viewer.display import Drawn
 from shiplog.report.viewer.style import entity
 
-HULL = np.array(  # (ahead, starboard) in ship lengths and breadths: a transom and a pointed bow
-    [(0.5, 0.0), (0.28, 0.5), (-0.42, 0.5), (-0.5, 0.38), (-0.5, -0.38), (-0.42, -0.5),
-     (0.28, -0.5), (0.5, 0.0)]
-)  # fmt: skip
+HULL = hull.OUTLINE  # of a ship whose profile has none
 NORTHWARD = pl.DataFrame({"x0": [0.0], "y0": [0.0], "heading": [0.0]})
 FARTHEST_M = 500.0  # m
 METRES = {"m": 1.0, "km": 1000.0}  # in a unit of the chart
@@ -140,18 +137,14 @@ def positions(table: pl.DataFrame) -> NDArray[np.float64]:
 
 def outline(drawn: Drawn) -> NDArray[np.float64]:
     """[K, 2] (ahead, starboard) of midship: the ship's own outline, closed, or one like it."""
-    if not drawn.ship_outline:
-        return HULL * (drawn.ship_length, drawn.ship_breadth)
-    return np.array([*drawn.ship_outline, drawn.ship_outline[0]], dtype=float)
+    return hull.outline(drawn.ship_length, drawn.ship_breadth, drawn.ship_outline)
 
 
 def hulls(table: pl.DataFrame, outline: NDArray[np.float64]) -> NDArray[np.float64]:
-    """[N, K, 2] the outline [K, 2] of the ship at every row, to scale."""
-    ahead, starboard = outline.T
-    heading = np.radians(display.column(table, "heading"))[:, None]
-    east = ahead * np.sin(heading) + starboard * np.cos(heading)
-    north = ahead * np.cos(heading) - starboard * np.sin(heading)
-    return positions(table)[:, None, :] + np.stack((east, -north), axis=-1)
+    """[N, K, 2] (east, south) of the outline [K, 2] of the ship at every row, to scale."""
+    x0, y0 = (display.column(table, name) for name in ("x0", "y0"))
+    heading = np.radians(display.column(table, "heading"))
+    return hull.placed(outline, x0, y0, heading) * (1.0, -1.0)
 
 
 def hull_interval(rows: pl.DataFrame, length: float) -> float:
@@ -159,10 +152,9 @@ def hull_interval(rows: pl.DataFrame, length: float) -> float:
     a ship's length between them."""
     time = display.column(rows, "time")
     sailed = float(np.nansum(np.linalg.norm(np.diff(positions(rows), axis=0), axis=1)))
-    count = min(max(sailed / length, 1.0), MOST_HULLS)
-    least = (time[-1] - time[0]) / count if len(time) else 1.0
-    choices = [1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1200, 1800, 3600]
-    return float(next((c for c in choices if c >= least), 3600 * math.ceil(least / 3600)))
+    return hull.interval(
+        float(time[-1] - time[0]) if len(time) else 0.0, sailed, length, MOST_HULLS
+    )
 
 
 def _send_measured(

@@ -1,8 +1,8 @@
 """Rerun's viewer in a browser of this machine, on a page that asks nobody else for anything.
 
-Rerun's own page asks four hosts elsewhere: for its fonts, for its documentation's pictures, and to
-count its users. This one is ours. It loads only Rerun's program, and its Content-Security-Policy
-forbids the browser any other address, whatever that program would like.
+Rerun's own page takes its fonts from a host elsewhere (findings/rerun_web_page_asks_google.sh). This
+one is ours. It loads only Rerun's program, and its Content-Security-Policy forbids the browser any
+other address, whatever that program asks for.
 """
 
 from __future__ import annotations

@@ -8,10 +8,8 @@ from dataclasses import asdict, dataclass
 import numpy as np
 import polars as pl
 
-from shiplog.nomenclature.numbers import figure
+from shiplog.nomenclature.numbers import NINETY_SPREADS, figure
 from shiplog.simulation.extended_simulator import Extension
-
-NINETY_SPREADS = 1.645  # standard deviations to either end of a normal distribution's middle 90 %
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,10 +10,9 @@ from shiplog.diagnosis.hypotheses.hypothesis import name_of
 from shiplog.diagnosis.residual.next_manoeuvre import Advice
 from shiplog.diagnosis.verdict.result import SIDE_THRUST, Decision, Named
 from shiplog.exceptions import listed
-from shiplog.nomenclature.numbers import figure
+from shiplog.nomenclature.numbers import NINETY_SPREADS, figure
 from shiplog.report.evaluation.text_table import table
 
-NINETY_SPREADS = 1.645  # standard deviations to either end of a 90 % interval
 WHICH = ("channel", "actuator")  # the part of a cause's label after the colon
 SIDE_REMEDY = (
     "Find out what pushed at these times. If it is a thruster of the ship, record its order or its "

@@ -10,8 +10,7 @@ from shiplog.diagnosis.verdict.result import Decision
 from shiplog.models.causes import Cause, Setting, si
 from shiplog.nomenclature.numbers import figure, percent
 from shiplog.report.evaluation.text_table import table
-
-HOPELESS = 30.0  # realistic sizes, beyond which a cause counts as undetectable
+from shiplog.report.figures.bars import HOPELESS
 
 
 @dataclass(frozen=True, slots=True)

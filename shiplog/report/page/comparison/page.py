@@ -28,12 +28,13 @@ from shiplog.report.page.blocks import (
     Part,
     Section,
     number,
+    or_diverged,
     probability,
     share,
 )
 from shiplog.report.page.comparison.alike import Item, differences
 from shiplog.report.page.diagnosis.page import WORDS
-from shiplog.report.page.evaluation.page import gallery
+from shiplog.report.page.drawing import gallery
 from shiplog.simulation import error_reduction
 
 MOST_LIMITS = 30  # rows of the table of smallest sizes
@@ -220,8 +221,8 @@ def _errors(items: Sequence[Item]) -> list[Block]:
         for name, answer in item.result.answers.items():
             rows.append((
                 [f"{item.name}: {name}" if item.name != name else name],
-                _or_diverged(answer["loss"]), _or_diverged(answer["end_position_m"], "m"),
-                _or_diverged(answer["end_heading_deg"], "deg"), _change(base, _losses(item, name)),
+                or_diverged(answer["loss"]), or_diverged(answer["end_position_m"], "m"),
+                or_diverged(answer["end_heading_deg"], "deg"), _change(base, _losses(item, name)),
             ))  # fmt: skip
     head = ("model", "L", "position at the end", "heading at the end", "L over the first's")
     names = ("position_error", "heading_error", "windows")
@@ -242,10 +243,6 @@ def _together(items: Sequence[Item]) -> Content:
             errors=pl.concat([data.errors, other.errors.filter(more)]),
         )  # fmt: skip
     return replace(content, data=data)
-
-
-def _or_diverged(value: float | None, unit: str = "") -> Line:
-    return ["diverged"] if value is None else [number(value, unit)]
 
 
 def _losses(item: Item, run: str | None = None) -> pl.DataFrame:

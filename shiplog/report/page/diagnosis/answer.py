@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from shiplog.diagnosis.thresholds import STATED
 from shiplog.exceptions import listed
 from shiplog.nomenclature.numbers import counted, percent
 from shiplog.report.diagnosis.sections.subject import MOST_VOYAGES, dates
@@ -14,7 +15,6 @@ from shiplog.report.page.diagnosis import considered
 from shiplog.report.page.diagnosis.source import Source
 
 MOST_MISSED = 4  # causes that are listed on the first screen; the others are counted
-STATED = 0.9  # probability, from which an answer is named
 
 # Verdict → what its owner is to do. Of a verdict `named`, each cause has its own.
 TO_DO = {
@@ -111,7 +111,7 @@ def _what(verdict: Mapping[str, Any]) -> list[Line]:
 
 
 def _outside(verdict: Mapping[str, Any]) -> str | None:
-    """What goes with something that is sure to act beside the named causes: " (heading)"."""
+    """The family, in brackets, of what acts outside the catalogue; None where that is not sure."""
     for one in verdict["ranking"]:
         if one["name"].startswith("unknown") and one["probability"] >= STATED:
             family = one["name"].partition(":")[2].replace("_", " ")

@@ -10,8 +10,9 @@ from typing import Any
 
 from shiplog.exceptions import ShiplogError
 from shiplog.nomenclature.contract import CONTRACT
-from shiplog.report.figures import picture_data, pictures, style
+from shiplog.report.figures import picture_data
 from shiplog.report.figures.content import Content
+from shiplog.report.page import drawing
 from shiplog.report.page.blocks import Drawn
 
 VERDICT, PROVENANCE, GATE = "verdict.json", "provenance.json", "gate.json"
@@ -43,22 +44,9 @@ class Source:
     def word(self) -> str:
         return str(self.verdict["verdict"])
 
-    def drawn(self, name: str, voyage: str | None = None, wide: bool = False) -> Drawn | None:
-        """A picture with its words; None where there is nothing to draw."""
-        picture = pictures.PICTURES[name]
-        content = self.content if voyage is None else pictures.of_voyage(self.content, voyage)
-        table = picture.table(content)
-        if table.is_empty():
-            return None
-        place = "" if voyage is None else f"-{self.content.data.names.index(voyage) + 1}"
-        svg = style.svg(pictures.figure(name, content), f"{name}{place}")
-        caption = picture.title if voyage is None else f"{picture.title}, {voyage}"
-        return Drawn(svg, picture.words(table, content), caption, wide)
-
     def gallery(self, names: Sequence[str], voyage: str | None = None) -> list[Drawn]:
         """Those of these pictures that have something to draw."""
-        found = [self.drawn(name, voyage) for name in names]
-        return [one for one in found if one is not None]
+        return drawing.gallery(self.content, names, voyage)
 
 
 def is_verdict(folder: Path) -> bool:

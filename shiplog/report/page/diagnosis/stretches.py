@@ -1,4 +1,4 @@
-"""Stretches of the voyages that the verdict marks, each with the command that opens it."""
+"""Stretches of the voyages that the verdict marks, each with what opens it in the recording."""
 
 from __future__ import annotations
 
@@ -15,16 +15,15 @@ def blocks(source: Source) -> list[Block]:
     rows = [
         (
             [one["voyage"]], [seconds(one["start_s"])], [seconds(one["end_s"])],
-            [one["kind"]], [one["sentence"]],
+            [one["kind"]], [one["sentence"]], [f"{one['voyage']}:{one['start_s']:.0f}"],
         )
         for one in verdict["intervals"][:MOST_ROWS]
     ]  # fmt: skip
     if rows:
-        found.append(Grid(("voyage", "from", "to", "kind", "what"), rows, ("from", "to")))
+        head = ("voyage", "from", "to", "kind", "what", "--at")
+        found.append(Grid(head, rows, ("from", "to")))
         first = verdict["intervals"][0]
-        found.append(
-            Paragraph(["The first of them in the recording; for another, change the end:"])
-        )
+        found.append(Paragraph(["The first in the recording; for another, with its own `--at`:"]))
         found.append(opening(source, first["voyage"], first["start_s"]))
     else:
         found.append(Paragraph(["No stretch was left out, or is outside the training data."]))

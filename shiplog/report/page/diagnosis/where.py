@@ -21,7 +21,7 @@ def blocks(source: Source) -> list[Block]:
         found.append(Paragraph(["See this window in the recording:"]))
         found.append(opening(source, voyage, float(own["time"][0])))
     names = source.content.data.names
-    tracks = [one for name in names[:MOST_TRACKS] if (one := source.drawn("track", name))]
+    tracks = [d for name in names[:MOST_TRACKS] for d in source.gallery(("track",), name)]
     if tracks:
         title = "Tracks of every voyage" if len(names) <= MOST_TRACKS else "Tracks of six voyages"
         found.append(Fold(title, [Gallery(tracks)]))

@@ -11,12 +11,9 @@ from shiplog.nomenclature.channels import DEGREE
 from shiplog.nomenclature.numbers import counted, figure, percent
 from shiplog.report.diagnosis.sections.subject import MOST_VOYAGES, begin, dates
 from shiplog.report.diagnosis.terms import TERMS
-from shiplog.report.figures import pictures, style
-from shiplog.report.figures.content import Content
 from shiplog.report.page.blocks import (
     Answers,
     Block,
-    Drawn,
     Fold,
     Gallery,
     Grid,
@@ -28,9 +25,11 @@ from shiplog.report.page.blocks import (
     Section,
     moment,
     number,
+    or_diverged,
     seconds,
     share,
 )
+from shiplog.report.page.drawing import gallery
 from shiplog.report.page.evaluation.source import Source
 
 COVERAGE = ("wind", "drift")
@@ -98,22 +97,6 @@ def _off(run: str, answer: Mapping[str, Any]) -> str:
     degrees = figure(judged["median_end_heading_deg"])
     also = f", {lost} diverged" if lost else ""
     return f"{run} {figure(lengths)} ship lengths and {degrees} deg off{also}"
-
-
-def gallery(content: Content, names: tuple[str, ...], voyage: str | None = None) -> list[Drawn]:
-    """Those of these pictures that have something to draw."""
-    found = []
-    own = content if voyage is None else pictures.of_voyage(content, voyage)
-    place = "" if voyage is None else f"-{content.data.names.index(voyage) + 1}"
-    for name in names:
-        picture = pictures.PICTURES[name]
-        table = picture.table(own)
-        if table.is_empty():
-            continue
-        svg = style.svg(pictures.figure(name, own), f"{name}{place}")
-        caption = picture.title if voyage is None else f"{picture.title}, {voyage}"
-        found.append(Drawn(svg, picture.words(table, own), caption))
-    return found
 
 
 def _beats(answer: Mapping[str, Any]) -> bool:
@@ -187,18 +170,14 @@ def _models(source: Source) -> Grid:
     rows = []
     for name, answer in source.answers.items():
         rows.append((
-            [name], _or_diverged(answer["loss"]), _or_diverged(answer["end_position_m"], "m"),
-            _or_diverged(answer["end_heading_deg"], "deg"),
+            [name], or_diverged(answer["loss"]), or_diverged(answer["end_position_m"], "m"),
+            or_diverged(answer["end_heading_deg"], "deg"),
         ))  # fmt: skip
     floors = next(iter(source.answers.values()))["floors"]
-    rows += [([f"baseline: {BASELINES.get(k, k)}"], _or_diverged(v), ["-"], ["-"])
+    rows += [([f"baseline: {BASELINES.get(k, k)}"], or_diverged(v), ["-"], ["-"])
              for k, v in floors.items()]  # fmt: skip
     head = ("model", "L", "position at the end", "heading at the end")
     return Grid(head, rows, head[1:], "Models and baselines on the same windows")
-
-
-def _or_diverged(value: float | None, unit: str = "") -> Line:
-    return ["diverged"] if value is None else [number(value, unit)]
 
 
 def _where(source: Source) -> list[Block]:
@@ -214,7 +193,7 @@ def _where(source: Source) -> list[Block]:
 def _voyages(source: Source) -> list[Block]:
     answer = next(iter(source.answers.values()))
     rows = [
-        ([name], _or_diverged(one["loss"]), [number(one["windows"])],
+        ([name], or_diverged(one["loss"]), [number(one["windows"])],
          [share(one["coverage"])] if one["coverage"] is not None else ["-"])
         for name, one in answer["voyages"].items()
     ]  # fmt: skip
@@ -222,7 +201,7 @@ def _voyages(source: Source) -> list[Block]:
     found: list[Block] = [Grid(head, rows, head[1:])]
     if worst := answer.get("worst"):
         lines = [
-            ([one["voyage"]], [seconds(one["start_s"])], _or_diverged(one["loss"]),
+            ([one["voyage"]], [seconds(one["start_s"])], or_diverged(one["loss"]),
              [one["reason"] or "inside the training data"])
             for one in worst
         ]  # fmt: skip

@@ -28,7 +28,7 @@ from shiplog.report.page.blocks import (
     number,
     seconds,
 )
-from shiplog.report.page.evaluation.page import gallery
+from shiplog.report.page.drawing import gallery
 from shiplog.voyages.store.store import Store
 
 MOST_FINDINGS = 60  # rows of a voyage's table; the JSON has them all
