@@ -272,3 +272,22 @@ def test_a_chart_has_the_coordinates_of_the_ellipsoid():
     latitude, longitude = (a.get_major_formatter() for a in (axes.yaxis, axes.xaxis))
     assert (latitude(0.0, 0), latitude(1856.9, 0)) == ("60°00.0'N", "60°01.0'N")
     assert (longitude(0.0, 0), longitude(930.0, 0)) == ("135°30.0'E", "135°31.0'E")
+
+
+@pytest.mark.parametrize(
+    ("least", "most", "labels"),
+    [(600.0, 900.0, {"600", "700", "800", "900"}), (150.0, 900.0, {"200", "500"}),
+     (90.0, 9000.0, {"100", "1000"})],
+)  # fmt: skip
+def test_a_logarithmic_axis_has_labels_whatever_it_spans(least, most, labels):
+    data = page_content.pictures(windows=2)
+    loss = pl.when(pl.col("window") == 0).then(least).otherwise(most)
+    data = data_files.replace(data, errors=data.errors.with_columns(loss=loss))
+    made = pictures.figure("windows", Content(page_content.verdict(), data))
+    made.draw_without_rendering()
+    axis = made.axes[0].yaxis
+    low, high = axis.get_view_interval()
+    both = zip(axis.get_ticklocs(), axis.get_majorticklabels(), strict=True)
+    minor = zip(axis.get_minorticklocs(), axis.get_minorticklabels(), strict=True)
+    shown = {text.get_text() for at, text in (*both, *minor) if low <= at <= high}
+    assert labels <= shown - {""}

@@ -7,6 +7,7 @@ other; on a phone each has the whole width, and its letters stay as large.
 from __future__ import annotations
 
 import io
+import math
 import re
 import warnings
 from collections.abc import Iterator, Mapping
@@ -55,11 +56,20 @@ def styled(rules: Mapping[Any, Any] = RULES) -> Iterator[None]:
 
 
 def plain_log(axis: Axis) -> None:
-    """Labels of a logarithmic axis as 100 and 1000: powers would be formulas, which no text is."""
-    from matplotlib.ticker import NullFormatter
+    """Labels of a logarithmic axis as 100 and 1000: powers would be formulas, which no text is.
+
+    Between powers of ten there are labels at 2 and 5 where the axis has hardly one power, and at
+    every tick where it may have none of these.
+    """
+
+    def between(value: float, _: int) -> str:
+        low, high = sorted(axis.get_view_interval())
+        digit = round(value / 10.0 ** math.floor(math.log10(value)))
+        wanted = high < 3.0 * low or (high < 20.0 * low and digit in (2, 5))
+        return f"{value:g}" if wanted else ""
 
     axis.set_major_formatter(lambda value, _: f"{value:g}")
-    axis.set_minor_formatter(NullFormatter())
+    axis.set_minor_formatter(between)
 
 
 @contextmanager

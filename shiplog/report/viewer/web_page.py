@@ -1,6 +1,6 @@
 """Rerun's viewer in a browser of this machine, on a page that asks nobody else for anything.
 
-Rerun's own page takes its fonts from a host elsewhere (findings/rerun_web_page_asks_google.sh). This
+Rerun's own page takes its font from a host elsewhere: findings/rerun_web_page_asks_google.sh. This
 one is ours. It loads only Rerun's program, and its Content-Security-Policy forbids the browser any
 other address, whatever that program asks for.
 """
