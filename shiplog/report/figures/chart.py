@@ -157,7 +157,9 @@ def _draw_hulls(
     outlines = hull.placed(shape, x0[marks], y0[marks], heading[marks])
     outlines = outlines[np.isfinite(outlines).all((1, 2))]
     axes.add_collection(
-        PolyCollection(list(outlines), facecolors="none", edgecolors=colour, linewidths=0.6)
+        PolyCollection(
+            list(outlines), facecolors="none", edgecolors=colour, linewidths=0.6, zorder=3
+        )
     )
 
 

@@ -109,7 +109,7 @@ def _draw_chart(axes: Axes, drawn: Drawn, voyage: str) -> None:
     hulls = hulls[np.isfinite(hulls).all(axis=(1, 2))]
     edge = colours.web(colours.faded(colours.MEASURED, 0.8))
     axes.add_collection(
-        PolyCollection(list(hulls), facecolors="none", edgecolors=edge, linewidths=0.5)
+        PolyCollection(list(hulls), facecolors="none", edgecolors=edge, linewidths=0.5, zorder=3)
     )
     for bank in drawn.banks:
         x0, y0 = np.array(bank).T
