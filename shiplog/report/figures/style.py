@@ -62,7 +62,7 @@ def plain_log(axis: Axis) -> None:
     every tick where it may have none of these.
     """
 
-    def between(value: float, _: int) -> str:
+    def between(value: float, _: float) -> str:
         low, high = sorted(axis.get_view_interval())
         digit = round(value / 10.0 ** math.floor(math.log10(value)))
         wanted = high < 3.0 * low or (high < 20.0 * low and digit in (2, 5))
