@@ -17,7 +17,7 @@ from shiplog.models import mmg
 from shiplog.models.extended import Extended
 from shiplog.models.mmg import body
 from shiplog.ship_profile import file as profiles
-from shiplog.simulation.sensitivities import rate
+from shiplog.simulation.jax_rollouts import rate
 from shiplog.voyages.rows.recording import Record
 
 PROFILE = profiles.load("esso-vectwin")

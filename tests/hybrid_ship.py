@@ -6,7 +6,7 @@ from shiplog.models.mmg import MMG, estimated, geometry_of
 from shiplog.ship_profile import file as profiles
 from shiplog.ship_profile.profile import Profile
 from shiplog.simulation import sensitivities
-from shiplog.simulation.sensitivities import WindowSeries
+from shiplog.simulation.window_series import WindowSeries
 
 SHIP = """
 [ship]

@@ -32,7 +32,7 @@ assert precision() == single
 import shiplog
 shiplog.diagnose  # loads all that it needs
 from shiplog.diagnosis.linear import linearisation
-from shiplog.simulation import sensitivities
+from shiplog.simulation import window_series, sensitivities
 assert precision() == single and (variables(), settings()) == (environment, before)
 
 @jax.tree_util.register_static
@@ -52,7 +52,7 @@ other = threading.Thread(target=host)
 other.start()
 k, n = 0.1 + 1e-9, 20
 start = np.zeros((1, n, 6)); start[0, 0, 1] = 1.0
-data = sensitivities.WindowSeries(
+data = window_series.WindowSeries(
     start, np.zeros((1, n, 1)), np.zeros((1, n, 2)), np.ones((1, n - 1)), np.ones(1))
 states, slopes = sensitivities.linearised(Coasting(), np.array([k]), data)
 normal = sensitivities.normal(Coasting(), np.array([k]), data)

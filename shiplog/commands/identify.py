@@ -19,7 +19,8 @@ from shiplog.report.evaluation.identification import PAGE, Identification
 from shiplog.report.evaluation.text_table import inert
 from shiplog.report.result import Answer
 from shiplog.simulation import baselines, prediction_interval, scoring
-from shiplog.simulation.sensitivities import Simulator, WindowSeries, losses, rollout
+from shiplog.simulation.sensitivities import Simulator, losses, rollout
+from shiplog.simulation.window_series import WindowSeries
 from shiplog.training.physics import identifiability, physics_files
 from shiplog.training.physics.cross_validation import CrossValidated, cross_validate
 from shiplog.training.physics.held_out import (

@@ -120,7 +120,7 @@ class Traced:
         def flat(*given: Any) -> Any:
             return self._function(*jax.tree.unflatten(tree, given), **static)
 
-        if not _own(tree):
+        if not own(tree):
             return jax.jit(flat, compiler_options=COMPILER)
         name = f"{self._function.__module__}.{self._function.__qualname__}"
         digest = hashlib.sha256(disk_cache.source() + f"{jax.__version__} {name} {key}".encode())
@@ -149,14 +149,14 @@ def _keep(kept: Any, found: export.Exported) -> None:
         log.info("not kept: %s", error)
 
 
-def _own(tree: Any) -> bool:
+def own(tree: Any) -> bool:
     """Whether all that is static in a tree of arguments is of this program: then its `repr` and
     the source say what it does."""
     node = tree.node_data()
     if node is None:
         return True
     kind, static = node
-    return _ours(kind) and _all_ours(static) and all(_own(child) for child in tree.children())
+    return _ours(kind) and _all_ours(static) and all(own(child) for child in tree.children())
 
 
 def _all_ours(static: Any) -> bool:

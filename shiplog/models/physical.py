@@ -43,7 +43,7 @@ class Beginning(NamedTuple):
 
 @dataclass(frozen=True)
 class PhysicalModel:
-    """A file of equations gives one as MODEL. Equations are as `sensitivities.Physical` has them.
+    """A file of equations gives one as MODEL. Equations are as `window_series.Physical` has them.
 
     begin    of a profile, settings and a TOML of coefficients (None: published or estimated ones).
              Raises ProfileError where the ship lacks what the equations need

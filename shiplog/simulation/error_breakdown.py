@@ -15,7 +15,7 @@ from shiplog.nomenclature import channels
 from shiplog.nomenclature.frames import wrap
 from shiplog.ship_profile.profile import Profile
 from shiplog.simulation.scoring import loss_shares
-from shiplog.simulation.sensitivities import VELOCITY_COLUMNS, WindowSeries, apparent_wind
+from shiplog.simulation.window_series import VELOCITY_COLUMNS, WindowSeries, apparent_wind
 from shiplog.voyages.windows.windows import seconds_since
 
 CHANNELS = tuple(c.name for c in channels.VELOCITY)

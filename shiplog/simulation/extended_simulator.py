@@ -17,7 +17,8 @@ from shiplog.models.extended import Extended
 from shiplog.nomenclature.frames import wrap
 from shiplog.ship_profile.profile import Profile
 from shiplog.simulation.scoring import window_loss
-from shiplog.simulation.sensitivities import WindowSeries, rollout
+from shiplog.simulation.sensitivities import rollout
+from shiplog.simulation.window_series import WindowSeries
 from shiplog.voyages.rows.recording import Record
 from shiplog.voyages.windows.windows import Windows
 

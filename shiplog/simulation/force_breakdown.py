@@ -8,7 +8,8 @@ import polars as pl
 from shiplog.machine.jit_cache import traced
 from shiplog.nomenclature.channels import STATE
 from shiplog.ship_profile.profile import Profile
-from shiplog.simulation.sensitivities import Simulator, true_wind
+from shiplog.simulation.sensitivities import Simulator
+from shiplog.simulation.window_series import true_wind
 
 
 def break_down(simulator: Simulator, seconds: pl.DataFrame, profile: Profile) -> pl.DataFrame:

@@ -11,8 +11,9 @@ from hybrid_ship import COUNT, PHYSICS, PROFILE, SHIP, SIZE, THETA, WIDTH, flat,
 from shiplog.models.hybrid import Hybrid, anchored, first_weights, weight_spread
 from shiplog.models.mmg import MMG, estimated, geometry_of
 from shiplog.ship_profile import file as profiles
-from shiplog.simulation import coverage, force_breakdown, sensitivities
-from shiplog.simulation.sensitivities import Simulator, WindowSeries
+from shiplog.simulation import coverage, force_breakdown, sensitivities, window_series
+from shiplog.simulation.sensitivities import Simulator
+from shiplog.simulation.window_series import WindowSeries
 from shiplog.training.physics import hybrid_training
 
 
@@ -155,7 +156,7 @@ def test_an_azimuth_that_has_turned_round_stands_where_it_stood(hybrid, trained,
 def table(data: WindowSeries) -> pl.DataFrame:
     """The samples as the 1 Hz table has them, the wind as it was felt on board."""
     state, actuator, wind = flat(data)
-    felt = sensitivities.apparent_wind(state, wind)
+    felt = window_series.apparent_wind(state, wind)
     names = ("x0", "surge", "y0", "sway", "heading", "yaw_rate")
     columns = {name: state[:, i] for i, name in enumerate(names)}
     columns |= {"azimuth": actuator[:, 0], "thruster": actuator[:, 1]}
@@ -189,7 +190,7 @@ def test_windows_of_no_weight_teach_it_nothing(physics, data):
     wrong[5:] = 99.0
     weight = np.where(np.arange(COUNT) < 5, 1.0, 0.0)
     some = hybrid_training.residual(physics, data._replace(measured=wrong, weight=weight), WIDTH)
-    alone = hybrid_training.residual(physics, sensitivities.pick(data, slice(0, 5)), WIDTH)
+    alone = hybrid_training.residual(physics, window_series.pick(data, slice(0, 5)), WIDTH)
     for name in ("mean", "std", "bound", "anchors", "radius", "limit"):
         assert getattr(some, name) == pytest.approx(getattr(alone, name)), name
 

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from shiplog.simulation.sensitivities import WindowSeries
+from shiplog.simulation.window_series import WindowSeries
 
 
 @jax.tree_util.register_static

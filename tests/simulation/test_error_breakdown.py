@@ -10,7 +10,7 @@ import pytest
 from shiplog.ship_profile import file as profiles
 from shiplog.simulation import error_breakdown
 from shiplog.simulation.scoring import window_loss
-from shiplog.simulation.sensitivities import WindowSeries
+from shiplog.simulation.window_series import WindowSeries
 
 COUNT, SIZE = 30, 100
 

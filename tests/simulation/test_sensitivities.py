@@ -11,7 +11,7 @@ from shiplog.models.mmg import parameters
 from shiplog.models.mmg.geometry import geometry_of
 from shiplog.models.mmg.model import MMG
 from shiplog.ship_profile import file as profiles
-from shiplog.simulation import sensitivities
+from shiplog.simulation import jax_rollouts, sensitivities, window_series
 from shiplog.simulation.scoring import window_loss
 
 SHIFT = 1e-5
@@ -95,7 +95,7 @@ def test_parameters_that_err_together_spread_by_their_sum(coupled, monkeypatch):
     _, slopes = sensitivities.linearised(model, theta, data)
     sigma = np.array([0.01, -0.02, 0.003, 0.001])
     monkeypatch.setattr(sensitivities, "WINDOWS_AT_A_TIME", 8)
-    many = sensitivities.pick(data, [0, 1, 2, 3, 4] * 3)
+    many = window_series.pick(data, [0, 1, 2, 3, 4] * 3)
     found = sensitivities.spread(model, theta, np.outer(sigma, sigma), many)
     assert found == pytest.approx(np.tile(np.abs(slopes @ sigma), (3, 1, 1)), abs=1e-7)
 
@@ -143,7 +143,7 @@ def test_the_gram_is_the_sum_of_squared_weighted_slopes(coupled):
 
 def test_windows_of_no_weight_are_left_out(coupled):
     model, theta, data = coupled
-    some = sensitivities.normal(model, theta, sensitivities.pick(data, [0, 2]))
+    some = sensitivities.normal(model, theta, window_series.pick(data, [0, 2]))
     weighed = sensitivities.normal(model, theta, data._replace(weight=np.array([1.0, 0, 1, 0, 0])))
     assert weighed.gram == pytest.approx(some.gram, rel=1e-10)
     assert weighed.loss[[0, 2]] == pytest.approx(some.loss, rel=1e-12)
@@ -171,10 +171,10 @@ def test_derivatives_by_some_parameters_are_those_among_all(coupled):
 def test_chunks_change_nothing(coupled, monkeypatch):
     model, theta, _ = coupled
     data = sailed(19, 30, 6, (1.0, 0.2))._replace(weight=np.linspace(0.0, 2.0, 19))
-    whole = sensitivities.normal(model, theta, data)
-    monkeypatch.setattr(sensitivities, "WINDOWS_AT_A_TIME", 8)
-    assert len(sensitivities.padded(data).weight) == 24
-    parts = sensitivities.normal(model, theta, data)
+    whole = jax_rollouts.normal(model, theta, data)
+    monkeypatch.setattr(jax_rollouts, "WINDOWS_AT_A_TIME", 8)
+    assert len(jax_rollouts.padded(data).weight) == 24
+    parts = jax_rollouts.normal(model, theta, data)
     assert parts.loss == pytest.approx(whole.loss, rel=1e-12)
     assert parts.pull == pytest.approx(whole.pull, rel=1e-10)
     assert parts.gram == pytest.approx(whole.gram, rel=1e-10)

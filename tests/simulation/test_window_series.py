@@ -10,8 +10,8 @@ import polars as pl
 import pytest
 from coupled_ships import Damped, sailed
 
-from shiplog.simulation import sensitivities
-from shiplog.simulation.sensitivities import WindowSeries
+from shiplog.simulation import jax_rollouts, sensitivities, window_series
+from shiplog.simulation.window_series import WindowSeries
 from shiplog.voyages.windows.windows import Windows
 
 # ---------------------------------------------------------------- wind
@@ -19,9 +19,9 @@ from shiplog.voyages.windows.windows import Windows
 
 def test_a_ship_at_rest_heading_north_has_an_east_wind_from_starboard():
     rest = np.zeros(6)
-    found = sensitivities.true_wind(rest, np.array([5.0, math.pi / 2]))
+    found = window_series.true_wind(rest, np.array([5.0, math.pi / 2]))
     assert found == pytest.approx([0.0, 5.0], abs=1e-12)
-    assert sensitivities.apparent_wind(rest, found) == pytest.approx([5.0, math.pi / 2])
+    assert window_series.apparent_wind(rest, found) == pytest.approx([5.0, math.pi / 2])
 
 
 @pytest.mark.parametrize(
@@ -36,16 +36,16 @@ def test_a_ship_at_rest_heading_north_has_an_east_wind_from_starboard():
 )
 def test_apparent_winds_worked_by_hand(state, true, apparent):
     state, true, apparent = (np.array(a, dtype=float) for a in (state, true, apparent))
-    assert sensitivities.apparent_wind(state, true) == pytest.approx(apparent, abs=1e-12)
-    assert sensitivities.true_wind(state, apparent) == pytest.approx(true, abs=1e-12)
+    assert window_series.apparent_wind(state, true) == pytest.approx(apparent, abs=1e-12)
+    assert window_series.true_wind(state, apparent) == pytest.approx(true, abs=1e-12)
 
 
 def test_true_and_apparent_wind_are_inverses():
     rng = np.random.default_rng(0)
     state, true = rng.normal(size=(4, 7, 6)), rng.normal(size=(4, 7, 2)) * 3.0
-    apparent = sensitivities.apparent_wind(state, true)
+    apparent = window_series.apparent_wind(state, true)
     assert apparent.shape == (4, 7, 2) and (np.abs(apparent[..., 1]) <= math.pi).all()
-    assert sensitivities.true_wind(state, apparent) == pytest.approx(true, abs=1e-12)
+    assert window_series.true_wind(state, apparent) == pytest.approx(true, abs=1e-12)
 
 
 # ---------------------------------------------------------------- series
@@ -60,11 +60,11 @@ def windows(data: WindowSeries, wind: np.ndarray | None = None) -> Windows:
 
 def test_windows_become_a_series_over_ground(coupled):
     _, _, data = coupled
-    apparent = sensitivities.apparent_wind(data.measured, data.wind)
-    found = sensitivities.series(windows(data, apparent))
+    apparent = window_series.apparent_wind(data.measured, data.wind)
+    found = window_series.series(windows(data, apparent))
     for name in WindowSeries._fields:
         assert getattr(found, name) == pytest.approx(getattr(data, name), abs=1e-12), name
-    calm = sensitivities.series(windows(data))  # no sensor
+    calm = window_series.series(windows(data))  # no sensor
     assert calm.wind.shape == data.wind.shape and not calm.wind.any()
 
 
@@ -80,7 +80,7 @@ def test_samples_weigh_by_the_trapezoidal_rule(coupled):
 @pytest.mark.parametrize(("count", "size"), [(1, 8), (8, 8), (9, 16), (128, 128), (129, 256)])
 def test_padding_reaches_the_next_size_with_windows_of_no_weight(count, size):
     data = sailed(count, 4, 1, (1.0,))
-    whole = sensitivities.padded(data)
+    whole = jax_rollouts.padded(data)
     for name in WindowSeries._fields:
         values = getattr(whole, name)
         assert len(values) == size
@@ -91,7 +91,7 @@ def test_padding_reaches_the_next_size_with_windows_of_no_weight(count, size):
 
 def test_picked_windows_keep_all_that_is_theirs(coupled):
     data = coupled[2]
-    some = sensitivities.pick(data, [3, 0])
+    some = window_series.pick(data, [3, 0])
     for name in WindowSeries._fields:
         assert (getattr(some, name) == getattr(data, name)[[3, 0]]).all()
 
@@ -102,7 +102,7 @@ def test_picked_windows_keep_all_that_is_theirs(coupled):
 def test_the_rate_turns_velocities_into_earth_axes():
     """Heading east: ahead is y₀, starboard is -x₀."""
     state = jnp.array([7.0, 2.0, 7.0, 0.5, math.pi / 2, 0.1])
-    found = sensitivities.rate(Damped(), jnp.ones(3), state, jnp.zeros(3), jnp.zeros(2))
+    found = jax_rollouts.rate(Damped(), jnp.ones(3), state, jnp.zeros(3), jnp.zeros(2))
     assert np.asarray(found) == pytest.approx([-0.5, -2.0, 2.0, -0.5, 0.1, -0.1], abs=1e-12)
 
 
@@ -160,16 +160,16 @@ def test_a_turning_ships_path_converges_at_the_first_order_too(coupled):
 def test_padding_and_neighbours_change_no_rollout(coupled):
     model, theta, data = coupled
     together = sensitivities.rollout(model, theta, data)
-    assert sensitivities.rollout(model, theta, sensitivities.padded(data))[:5] == pytest.approx(
+    assert sensitivities.rollout(model, theta, jax_rollouts.padded(data))[:5] == pytest.approx(
         together, rel=1e-12
     )
-    alone = sensitivities.rollout(model, theta, sensitivities.pick(data, [4]))
+    alone = sensitivities.rollout(model, theta, window_series.pick(data, [4]))
     assert alone[0] == pytest.approx(together[4], rel=1e-12)
 
 
 def test_simulated_windows_are_the_rollout(coupled):
     model, theta, data = coupled
-    apparent = sensitivities.apparent_wind(data.measured, data.wind)
+    apparent = window_series.apparent_wind(data.measured, data.wind)
     simulator = sensitivities.Simulator(model, theta, np.zeros((4, 4)))
     found = simulator.simulate(windows(data, apparent))
     assert found.dtype == np.float64

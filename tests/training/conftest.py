@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from boats import COUNT, TRUE, Boat, Growing, driven, measured
 
-from shiplog.simulation.sensitivities import WindowSeries
+from shiplog.simulation.window_series import WindowSeries
 
 
 @pytest.fixture(scope="module")

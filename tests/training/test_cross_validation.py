@@ -5,7 +5,8 @@ import pytest
 from boats import COUNT, START, TRUE, WIDE, Boat, Growing, driven, measured
 
 from shiplog.simulation import sensitivities
-from shiplog.simulation.sensitivities import Simulator, WindowSeries
+from shiplog.simulation.sensitivities import Simulator
+from shiplog.simulation.window_series import WindowSeries
 from shiplog.training.physics.cross_validation import cross_validate, folds
 from shiplog.training.physics.output_error import identify
 

@@ -5,8 +5,8 @@ import pytest
 from hybrid_ship import PHYSICS, SIZE, THETA, WIDTH, flat, sailed
 
 from shiplog.models.mmg import MMG
-from shiplog.simulation import sensitivities
-from shiplog.simulation.sensitivities import WindowSeries
+from shiplog.simulation import jax_rollouts, sensitivities
+from shiplog.simulation.window_series import WindowSeries
 from shiplog.training.physics import hybrid_training
 from shiplog.training.physics.output_error import Identified
 
@@ -35,7 +35,7 @@ def pulled(physics, theta, data) -> WindowSeries:
     path = [state]
     for i in range(SIZE - 1):
         at, blowing = data.actuator[:, i], data.wind[:, i]
-        moved = np.array(sensitivities.rate(physics, theta, state, at, blowing))
+        moved = np.array(jax_rollouts.rate(physics, theta, state, at, blowing))
         moved[:, 3] += PULL * at[:, 1]
         state = state + moved
         path.append(state)

@@ -10,8 +10,8 @@ import pytest
 from boats import COUNT, SIZE, START, TRUE, WIDE, Boat, Growing, driven, measured
 
 from shiplog.exceptions import ModelError
-from shiplog.simulation import sensitivities
-from shiplog.simulation.sensitivities import WindowSeries
+from shiplog.simulation import sensitivities, window_series
+from shiplog.simulation.window_series import WindowSeries
 from shiplog.training.physics import identifiability
 from shiplog.training.physics.output_error import CORRELATION, Identified, identify
 
@@ -189,7 +189,7 @@ def test_windows_of_no_weight_say_nothing(exact, blurred):
     weight = np.array([1.0, 0, 1, 1, 0, 1, 1, 1])
     wrong = blurred.measured.copy()
     wrong[weight == 0] += 3.0
-    some = sensitivities.pick(blurred, np.flatnonzero(weight))
+    some = window_series.pick(blurred, np.flatnonzero(weight))
     alone = identify(Boat(), START, WIDE, some)
     left_out = identify(Boat(), START, WIDE, WindowSeries(wrong, *blurred[1:4], weight))
     assert left_out.values == pytest.approx(alone.values, rel=1e-9)
@@ -282,7 +282,7 @@ def test_the_covariance_is_the_closed_form_of_one_window(weight, factor):
     s² (w S + 1/f⁴) / (w s²JᵀJ/σ² + 1/f²)², S between the gradient's square and what is expected
     of it, f how many times the plausible spread s the ridge allows."""
     whole = measured(Straight(), (0.02, -0.01, 0.005), driven(2))
-    data = noisy(sensitivities.pick(whole, [0]), seed=4)._replace(weight=np.array([weight]))
+    data = noisy(window_series.pick(whole, [0]), seed=4)._replace(weight=np.array([weight]))
     free, spread = np.array([True, False, False]), np.array([0.03, 1.0, 1.0])
     start = np.array([0.05, -0.01, 0.005])
     done = identify(Straight(), start, spread, data, free=free, factor=factor, rounds=1)
@@ -322,7 +322,7 @@ def test_each_window_is_one_observation_of_its_own_gradient():
     scatter = (COUNT * at.pull.T @ at.pull + 3.0 * one.noise * at.gram) / (COUNT + 3.0)
     wanted = COUNT / (COUNT - 1.0) * inverse @ scatter @ inverse
     assert one.covariance == pytest.approx(wanted, rel=1e-3, abs=1e-3 * np.abs(wanted).min())
-    twice = identify(Straight(), start, spread, sensitivities.pick(data, [*range(COUNT)] * 2))
+    twice = identify(Straight(), start, spread, window_series.pick(data, [*range(COUNT)] * 2))
     assert twice.values == pytest.approx(one.values, rel=1e-6)
     weighed = identify(Straight(), start, spread, data._replace(weight=np.full(COUNT, 2.0)))
     assert weighed.covariance == pytest.approx(twice.covariance, rel=1e-6)

@@ -5,7 +5,7 @@ import pytest
 from test_output_error import Straight, driven, measured, noisy
 
 from shiplog.simulation import sensitivities
-from shiplog.simulation.sensitivities import WindowSeries
+from shiplog.simulation.window_series import WindowSeries
 from shiplog.training.physics import regularisation
 from shiplog.training.physics.cross_validation import as_good
 from shiplog.training.physics.output_error import Identified, identify

@@ -15,7 +15,7 @@ import casadi  # type: ignore
 import numpy as np
 
 from shiplog.models.mmg.geometry import Geometry
-from shiplog.simulation.sensitivities import WindowSeries
+from shiplog.simulation.window_series import WindowSeries
 
 cs: Any = casadi  # SWIG's generated stubs do not know SX's operators
 Named = dict[str, Any]  # a part's coefficients, by what follows the dot in their names

@@ -25,7 +25,9 @@ from shiplog.models.mmg.model import MMG
 from shiplog.models.mmg.parameters import Parameters, load, published_file
 from shiplog.nomenclature.channels import VELOCITY_IN_STATE
 from shiplog.ship_profile import file as profile_file
-from shiplog.simulation.sensitivities import WindowSeries, linearised, normal, padded, rollout
+from shiplog.simulation.jax_rollouts import padded
+from shiplog.simulation.sensitivities import linearised, normal, rollout
+from shiplog.simulation.window_series import WindowSeries
 from shiplog.training.network.queue import cores
 from shiplog.training.physics.output_error import Identified, identify
 

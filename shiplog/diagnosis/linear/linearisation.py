@@ -27,7 +27,8 @@ from shiplog.diagnosis.linear import variational_equations
 from shiplog.diagnosis.linear.linear_segments import Linear, Path, Wide
 from shiplog.diagnosis.linear.segments import Cut, SegmentGrid
 from shiplog.machine.jit_cache import traced
-from shiplog.simulation.sensitivities import Physical, rate
+from shiplog.simulation.jax_rollouts import rate
+from shiplog.simulation.window_series import Physical
 
 SEGMENTS_AT_A_TIME = 64
 STILLEST = 1e-3  # m, m/s, rad or rad/s: no ship is measured as still as that

@@ -26,7 +26,7 @@ from shiplog.ship_profile.profile import Profile
 from shiplog.simulation import coverage as covering
 from shiplog.simulation import error_breakdown
 from shiplog.simulation.extended_simulator import campaign
-from shiplog.simulation.sensitivities import series
+from shiplog.simulation.window_series import series
 from shiplog.training.runs.load_model import Run
 from shiplog.voyages.rows.recording import Record
 from shiplog.voyages.store.store import Store

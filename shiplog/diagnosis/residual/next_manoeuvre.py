@@ -21,7 +21,8 @@ from shiplog.diagnosis.noise import likelihood
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.diagnosis.verdict.result import Named
 from shiplog.nomenclature import frames
-from shiplog.simulation.sensitivities import WindowSeries, rollout
+from shiplog.simulation.sensitivities import rollout
+from shiplog.simulation.window_series import WindowSeries
 from shiplog.voyages.rows.recording import Record
 
 MANOEUVRE_S = 300.0  # of a manoeuvre of a three-metre ship; other ships take theirs in ship time

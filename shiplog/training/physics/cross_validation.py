@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from shiplog.simulation.scoring import window_loss
-from shiplog.simulation.sensitivities import Simulator, WindowSeries, pick, rollout, spread
+from shiplog.simulation.sensitivities import Simulator, rollout, spread
+from shiplog.simulation.window_series import WindowSeries, pick
 
 FOLDS = 5
 WORKERS = 2  # fits at a time; compiled rollouts leave Python's lock

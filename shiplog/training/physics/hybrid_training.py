@@ -15,7 +15,7 @@ from shiplog.models.hybrid import Hybrid, Residual, anchored, first_weights, wei
 from shiplog.models.mmg import MMG
 from shiplog.nomenclature.channels import VELOCITY_IN_STATE
 from shiplog.simulation.coverage import independent_distance
-from shiplog.simulation.sensitivities import WindowSeries, apparent_wind
+from shiplog.simulation.window_series import WindowSeries, apparent_wind
 from shiplog.training.physics.cross_validation import as_good
 from shiplog.training.physics.output_error import Identified, identify
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shiplog.simulation.sensitivities import Simulator, WindowSeries, losses, series
+from shiplog.simulation.sensitivities import Simulator, losses
+from shiplog.simulation.window_series import WindowSeries, series
 from shiplog.training.physics import hybrid_training, output_error, regularisation
 from shiplog.training.physics.cross_validation import CrossValidated, cross_validate, finite_mean
 from shiplog.training.physics.output_error import Identified

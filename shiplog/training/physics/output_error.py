@@ -19,7 +19,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from shiplog.exceptions import ModelError, listed
-from shiplog.simulation.sensitivities import Physical, WindowSeries, losses, normal
+from shiplog.simulation.sensitivities import losses, normal
+from shiplog.simulation.window_series import Physical, WindowSeries
 
 CORRELATION = 30.0  # s over which rollout errors are one observation, not many
 LEAST_VARIANCE = 1e-12  # noise of data that a model fits exactly

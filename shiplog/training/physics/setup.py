@@ -17,7 +17,8 @@ from shiplog.models import MODELS
 from shiplog.models.coefficients import Parameters
 from shiplog.ship_profile.profile import Profile
 from shiplog.simulation.error_reduction import RUNAWAY
-from shiplog.simulation.sensitivities import WindowSeries, losses, series
+from shiplog.simulation.sensitivities import losses
+from shiplog.simulation.window_series import WindowSeries, series
 from shiplog.training.settings.run_config import Config
 from shiplog.voyages.rows import one_hertz
 from shiplog.voyages.windows import windows

@@ -1,0 +1,148 @@
+"""Rollouts of windows by the kernel of their kind of ship: arrays in, arrays out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from shiplog.nomenclature.channels import VELOCITY_WEIGHTS
+from shiplog.simulation.kernel import kinds
+from shiplog.simulation.kernel.kinds import Kernel, Purpose, aligned, contiguous, pointer
+from shiplog.simulation.kernel.windows import BLOCK, STATES, Windows
+from shiplog.simulation.window_series import Normal, WindowSeries
+
+CHUNK = 8  # steps whose rows are kept before they are summed: 24 rows of 70 are in the cache
+
+
+def _write_paths(module: Any, sizes: Any) -> None:
+    made = Windows(module, sizes(""))
+    made.rollout("rates")
+    made.values("rates")
+
+
+def _write_slopes(module: Any, sizes: Any) -> None:
+    made = Windows(module, sizes("state and θ"))
+    made.slopes("derivatives")
+    made.normal("derivatives", VELOCITY_WEIGHTS)
+
+
+PATHS = Purpose(
+    "paths", _write_paths, (("rates", ""),), (("rollout", "ppppppiiid"), ("values", "pppi"))
+)
+SLOPES = Purpose(
+    "slopes", _write_slopes, (("derivatives", "state and θ"),),
+    (("slopes_of", "ppppppppiiid"), ("normal", "ppppppppppppp" + "iiiiii" + "d")),
+)  # fmt: skip
+
+
+def _of(model: Any, purpose: Purpose, theta: np.ndarray, driven: int) -> Kernel | None:
+    return kinds.kernel(model, purpose, driven, len(theta))
+
+
+def values(model: Any, theta: np.ndarray, inputs: np.ndarray) -> np.ndarray | None:
+    """ν̇ [n, 3] of rows (state, what drives) [n, 6 + D]."""
+    kernel = _of(model, PATHS, theta, inputs.shape[1] - STATES)
+    if kernel is None:
+        return None
+    inputs, found = contiguous(inputs), np.empty((len(inputs), 3))
+    c = kernel.prepared(model, theta)
+    if len(inputs):
+        kernel.functions["values"](pointer(c), pointer(inputs), pointer(found), len(inputs))
+    return found
+
+
+def rollout(model: Any, theta: np.ndarray, data: WindowSeries) -> np.ndarray | None:
+    """States [N, I, 6]."""
+    kernel = _of(model, PATHS, theta, _driven(data))
+    if kernel is None:
+        return None
+    count, instants = data.measured.shape[:2]
+    found = np.empty((count, instants, STATES))
+    c, given = kernel.prepared(model, theta), _given(data)
+    if count:
+        kernel.functions["rollout"](
+            pointer(c), *map(pointer, given), pointer(found), count, instants, *_steps(model)
+        )
+    return found
+
+
+def slopes(
+    model: Any, theta: np.ndarray, data: WindowSeries,
+    out: tuple[np.ndarray, np.ndarray] | None = None,
+) -> tuple[np.ndarray, np.ndarray] | None:  # fmt: skip
+    """States [N, I, 6] and their derivatives [N, I, 6, P]."""
+    kernel = _of(model, SLOPES, theta, _driven(data))
+    if kernel is None:
+        return None
+    count, instants = data.measured.shape[:2]
+    shape = (count, instants, STATES)
+    states, found = out or (np.empty(shape), np.empty((*shape, len(theta))))
+    work = aligned(STATES * _padded(len(theta), kernel.lanes) * kernel.lanes)
+    c, given = kernel.prepared(model, theta), _given(data)
+    if count:
+        kernel.functions["slopes_of"](
+            pointer(c), *map(pointer, given), pointer(states), pointer(found), pointer(work),
+            count, instants, *_steps(model),
+        )  # fmt: skip
+    return states, found
+
+
+def normal(model: Any, theta: np.ndarray, data: WindowSeries, free: Sequence[int]) -> Normal | None:
+    """Loss [N], half its gradient [N, n] and JᵀJ [n, n] by the `free` coefficients."""
+    kernel = _of(model, SLOPES, theta, _driven(data))
+    if kernel is None:
+        return None
+    count, instants = data.measured.shape[:2]
+    n, lanes = len(free), kernel.lanes
+    padded, blocks = _padded(n, BLOCK), -(-count // lanes)
+    columns = np.ascontiguousarray(free, dtype=np.int64)
+    loss, pull = np.empty(blocks * lanes), np.empty((blocks, padded, lanes))
+    s, rows = aligned(STATES * padded * lanes), aligned(CHUNK * 3 * padded * lanes)
+    cells = padded // BLOCK * (padded // BLOCK + 1) // 2
+    gram = aligned(cells, BLOCK, BLOCK, lanes)
+    c, given = (
+        kernel.prepared(model, theta),
+        [*_given(data)[1:], *map(contiguous, (data.steps, data.weight))],
+    )
+    measured = contiguous(data.measured)
+    if count:
+        kernel.functions["normal"](
+            pointer(c), pointer(measured), *map(pointer, given), pointer(columns), pointer(loss),
+            pointer(pull), pointer(s), pointer(rows), pointer(gram),
+            count, instants, _steps(model)[0], n, padded, CHUNK, _steps(model)[1],
+        )  # fmt: skip
+    half = np.moveaxis(pull, 2, 1).reshape(-1, padded)[:count, :n]
+    return Normal(loss[:count], half, _square(gram.sum(-1), padded)[:n, :n])
+
+
+def _driven(data: WindowSeries) -> int:
+    return data.actuator.shape[-1] + 2
+
+
+def _given(data: WindowSeries) -> list[np.ndarray]:
+    """First states, actuators, wind and steps."""
+    return [contiguous(v) for v in (data.measured[:, 0], data.actuator, data.wind, data.dt)]
+
+
+def _steps(model: Any) -> tuple[int, float]:
+    """Steps to each measured one, and the part of it that each is."""
+    return model.substeps, 1.0 / model.substeps
+
+
+def _padded(count: int, to: int) -> int:
+    return max(-(-count // to) * to, to)
+
+
+def _square(cells: np.ndarray, size: int) -> np.ndarray:
+    """The whole matrix of its blocks [cells, 4, 4] at and above the diagonal."""
+    found = np.zeros((size, size))
+    at = 0
+    for i in range(0, size, BLOCK):
+        for j in range(i, size, BLOCK):
+            found[i : i + BLOCK, j : j + BLOCK] = cells[at]
+            if i != j:
+                found[j : j + BLOCK, i : i + BLOCK] = cells[at].T
+            at += 1
+    return found
