@@ -175,3 +175,22 @@ def test_a_delay_is_what_it_is_and_zero_is_zero(late):
     columns = np.concatenate((found.j[..., 4:, -1].reshape(-1, 1), owned), 1)
     delay = np.linalg.lstsq(columns, rows, rcond=None)[0][0]
     assert delay == pytest.approx(late, abs=0.01)
+
+
+def test_what_drives_is_kept_as_the_series_that_are_not_zero():
+    """An antenna moves no actuator, a rudder's lag no wind: of 5 x 4 series those of the rudder by
+    its lag and of the true wind by what turns it or moves it."""
+    model = Toy((AntennaOffset(), HeadingOffset(), RudderLag()))
+    windy = replace(RECORD, wind=RECORD.wind + np.array([3.0, 1.0]))
+    _, moved, _ = measurement_correction.read(model, SETTING, windy, ROWS)
+    dense = moved.dense()
+    assert dense.shape == moved.shape == (len(ROWS), GRID.instants, 5, 4)
+    there = np.argwhere(dense.any((0, 1)))
+    assert np.array_equal(moved.pairs, there) and [0, 3] in there.tolist()
+    assert len(there) < 8 and not dense[..., 2, :].any()  # the share of the campaign
+    assert np.array_equal(dense[1:3], moved.dense(slice(1, 3)))
+    # by hand: of the rudder with a lag more and less, averaged about the instants
+    step = measurement_correction.READ_STEP * RudderLag().sizes(SETTING)
+    late = [RudderLag().read(windy, by).actuator for by in (step, 0.0 * step)]
+    by_hand = segments.average_at_instants(windy, ROWS, late[0] - late[1]) / step
+    assert dense[..., 0, 3] == pytest.approx(by_hand[..., 0], abs=1e-12)

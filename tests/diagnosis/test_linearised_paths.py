@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from toy_ship import GRID, RECORD, ROWS, SETTING, THETA, WIDE, Coasting, Toy, path
+from toy_ship import GRID, RECORD, ROWS, SETTING, THETA, WIDE, Coasting, Toy, nothing, path
 
 from shiplog.diagnosis.linear import linearisation, measurement_correction, segments
 from shiplog.diagnosis.linear.linear_segments import Path
@@ -22,7 +22,7 @@ def simulated(at: Path, theta: np.ndarray = THETA) -> Cut:
 def test_nothing_is_left_of_what_the_model_made():
     at = replace(path(), acceleration=np.zeros((4, 3, GRID.nodes)))
     cut = simulated(at)
-    none = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
+    none = nothing(cut)
     found = linearisation.linear(Toy(), THETA, cut, GRID, at, *none)
     assert np.array_equal(found.e, np.zeros_like(found.e))
     assert found.j.shape[-1] == 4
@@ -35,7 +35,7 @@ def test_slopes_of_a_smooth_model_go_straight_between_seconds():
     what every node's slopes say, and what is constant stays exact."""
     at = replace(path(), acceleration=np.zeros((4, 3, GRID.nodes)))
     cut = simulated(at)
-    none = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
+    none = nothing(cut)
     exact, found = (
         linearisation.linear(Toy(smooth=smooth), THETA, cut, GRID, at, *none)
         for smooth in (0.0, 1.0)
@@ -104,7 +104,7 @@ def test_a_path_held_firmly_follows_the_acceleration_that_is_expected_of_it():
     assert without.acceleration == pytest.approx(0.0, abs=1e-5)
     off = linearisation.simulated(Toy(), THETA, cut, without, GRID)[0] - cut.y
     assert np.abs(off).max() > 0.02
-    none = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
+    none = nothing(cut)
     linear = linearisation.linear(Toy(), THETA, cut, GRID, without, *none)
     ahead = linearisation.predict_path(linear, np.zeros(4), firm, about)
     assert ahead.acceleration == pytest.approx(true.acceleration, abs=1e-5)
@@ -121,7 +121,7 @@ def test_a_path_that_is_not_finite_is_lost_by_itself():
     pulled = linearisation.fit_path(Toy(), THETA, cut, GRID, WIDE, broken)
     assert np.array_equal(pulled.acceleration[1], broken.acceleration[1], equal_nan=True)
     assert pulled.start[~away] == pytest.approx(true.start[~away], abs=1e-6)
-    none = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
+    none = nothing(cut)
     found = linearisation.linear(Toy(), THETA, cut, GRID, pulled, *none)
     assert np.array_equal(found.lost, away)
     assert not found.e[1].any() and not found.z[1].any() and not found.j[1].any()
@@ -169,8 +169,7 @@ def test_a_linearisation_expects_where_its_path_will_be_pulled():
     stood = linearisation.fit_path(Toy(), wrong, cut, GRID, tight)
     size = np.abs(stood.acceleration[:, 2]).max()
     assert size > 1e-4
-    nothing = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
-    linear = linearisation.linear(Toy(), wrong, cut, GRID, stood, *nothing)
+    linear = linearisation.linear(Toy(), wrong, cut, GRID, stood, *nothing(cut))
     found = linearisation.predict_path(linear, THETA - wrong, tight)
     assert np.abs(found.acceleration[:, 2]).max() < 0.1 * size
     assert found.start == pytest.approx(true.start, abs=1e-3)

@@ -142,9 +142,8 @@ def test_what_a_lag_would_change_is_after_a_step_and_not_before(sea):
     step = np.zeros_like(observed.actuator)
     step[1000:, 0] = 0.2
     stepped = replace(observed, actuator=step)
-    moved = measurement_correction.read(ref.model, ref.setting, stepped, np.array([900]))[1][
-        0, :, 0, column
-    ]
+    moved = measurement_correction.read(ref.model, ref.setting, stepped, np.array([900]))[1]
+    moved = moved.dense()[0, :, 0, column]
     # straight from row to row: the step is half a row before
     t = (900 - 1000 + 0.5 + timescale.STEP_ROWS * np.arange(len(moved))) * observed.step
     assert np.abs(moved[t < -0.15]).max() == 0.0

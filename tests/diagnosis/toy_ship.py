@@ -9,6 +9,7 @@ import numpy as np
 
 from shiplog.diagnosis.linear import segments
 from shiplog.diagnosis.linear.linear_segments import Path, Wide
+from shiplog.diagnosis.linear.measurement_correction import Moved
 from shiplog.diagnosis.linear.segments import Cut
 from shiplog.models.causes import Cause, Setting
 from shiplog.ship_profile import file as profiles
@@ -68,5 +69,5 @@ def path() -> Path:
     return Path(start, 0.01 * rng.standard_normal((len(ROWS), 3, GRID.nodes)))
 
 
-def nothing(cut: Cut) -> tuple[np.ndarray, np.ndarray]:
-    return np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
+def nothing(cut: Cut) -> tuple[Moved, np.ndarray]:
+    return Moved.none(cut), np.zeros((*cut.y.shape, 0))

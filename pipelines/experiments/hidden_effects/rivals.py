@@ -110,7 +110,7 @@ def regression(trial: Trial, fitted: np.ndarray, usual: Record) -> Ranked:
     sd = np.sqrt((rest[_used(before)] ** 2).mean(0))
     cut, moved, observed = measurement_correction.read(model, ref.setting, trial.record, trial.rows)
     bins = cut.y.shape[1]
-    y, driven, moved = cut.y, of_bins(cut.driven, bins), of_bins(moved, bins)
+    y, driven, moved = cut.y, of_bins(cut.driven, bins), of_bins(moved.dense(), bins)
     used = _used(cut)
     by = {}
     for cause in model.causes:

@@ -25,6 +25,7 @@ from jax import Array
 
 from shiplog.diagnosis.linear import variational_equations
 from shiplog.diagnosis.linear.linear_segments import Linear, Path, Wide
+from shiplog.diagnosis.linear.measurement_correction import Moved
 from shiplog.diagnosis.linear.segments import Cut, SegmentGrid
 from shiplog.machine.jit_cache import traced
 from shiplog.simulation.jax_rollouts import rate
@@ -251,7 +252,7 @@ def linear(
     segments: Cut,
     g: SegmentGrid,
     path: Path,
-    moved: np.ndarray,
+    moved: Moved,
     observed: np.ndarray,
     wide: Wide | None = None,
 ) -> Linear:
@@ -271,7 +272,7 @@ def linear(
         y, columns = np.where(lost[:, None, None], segments.y, y), columns.copy()
         columns[lost], observed = 0.0, np.where(lost[:, None, None, None], 0.0, observed)
     size = 6 + 3 * g.nodes
-    read = moved.shape[-1]
+    *_, read = moved.shape
     z, j = columns[..., :size].copy(), columns[..., size:].copy()
     j[..., len(theta) - read :] -= observed
     e = segments.y - y + np.einsum("sbcz,sz->sbc", z, path.coordinates)
@@ -365,7 +366,9 @@ def _every(model, theta, segments, path, g, moved):
         )
         states = states[keep]
         how = (
-            np.zeros((*driven[keep].shape, 0)) if moved is None else _interpolate(moved[part], many)
+            np.zeros((*driven[keep].shape, 0))
+            if moved is None
+            else _interpolate(moved.dense(part), many)
         )
         pairs = 0.5 * (states[:, 1:] + states[:, :-1])
         ys.append(pairs.reshape(len(states), g.bins, per, 6).mean(2))

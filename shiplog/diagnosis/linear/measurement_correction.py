@@ -6,12 +6,14 @@ h (READ_STEP of its realistic size), within the number's bounds:
     ∂u/∂q ≈ (u(q + h) - u(q - h)) / 2h,   ∂y/∂q ≈ (y(q + h) - y(q - h)) / 2h
 
 Causes read one after the other, in the catalogue's order, each what the one before it has made.
+A number changes few of the things that drive a ship: ∂u/∂q is kept as the series that are not zero
+(`Moved`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +28,45 @@ from shiplog.voyages.rows.recording import Record
 AVERAGING_S = 2.0  # s: a clock's column is a derivative, and its noise would pass for what it tells
 # Of a cause's size, to see how it changes what is read: less, and noise drowns a delay
 READ_STEP = 0.3
+
+
+@dataclass(frozen=True)
+class Moved:
+    """∂u/∂q [S, K, D, Q], how what drives the ship changes with the causes' numbers: the series
+    that are not zero, which are few.
+
+    shape   (S, K, D, Q)
+    pairs   [n, 2] int32: what drives d and number q of each series, in order; each pair once
+    series  [S, n, K] at the instants of the steps
+    """
+
+    shape: tuple[int, int, int, int]
+    pairs: np.ndarray
+    series: np.ndarray
+
+    @classmethod
+    def of(cls, shape: tuple[int, ...], series: Mapping[tuple[int, int], np.ndarray]) -> Moved:
+        """Of the series [S, K] of some pairs (d, q), without those that are zero everywhere."""
+        count, instants, driving, numbers = shape
+        kept = sorted(pair for pair, values in series.items() if values.any())
+        stacked = np.empty((count, len(kept), instants))
+        for i, pair in enumerate(kept):
+            stacked[:, i] = series[pair]
+        pairs = np.array(kept, np.int32).reshape(-1, 2)
+        return cls((count, instants, driving, numbers), pairs, stacked)
+
+    @classmethod
+    def none(cls, cut: Cut) -> Moved:
+        """Of causes without any number."""
+        return cls.of((*cut.driven.shape, 0), {})
+
+    def dense(self, part: slice = slice(None)) -> np.ndarray:
+        """∂u/∂q [S, K, D, Q] of a part of the segments, with its zeros."""
+        series = self.series[part]
+        whole = np.zeros((len(series), *self.shape[1:]))
+        for i, (d, q) in enumerate(self.pairs):
+            whole[:, :, d, q] = series[:, i]
+        return whole
 
 
 def corrected(causes: Sequence[Cause], record: Record, numbers: Mapping[str, np.ndarray]) -> Record:
@@ -73,7 +114,7 @@ def read(
     record: Record,
     rows: np.ndarray,
     numbers: Mapping[str, np.ndarray] | None = None,
-) -> tuple[Cut, np.ndarray, np.ndarray]:
+) -> tuple[Cut, Moved, np.ndarray]:
     """Segments as read with `numbers` (label → q, SI), ∂u/∂q [S, K, D, Q] and O = ∂y/∂q
     [S, B, 6, Q] there, zero for causes that change no reading. Those of a clock are of the motion
     averaged over AVERAGING_S, since the noise of a derivative says nothing of a clock."""
@@ -82,7 +123,8 @@ def read(
     columns = Columns(0, model.causes, np.concatenate([*sizes.values(), np.zeros(0)]))
     base = segments.cut(corrected(model.causes, record, given), rows)
     base = as_hypothesised(base, model.causes, given)
-    moved = np.zeros((*base.driven.shape, len(columns.unit)))
+    shape = (*base.driven.shape, len(columns.unit))
+    moved: dict[tuple[int, int], np.ndarray] = {}  # (d, q) → its series
     observed = np.zeros((*base.y.shape, len(columns.unit)))
     before = record  # as the causes before this one have it
     averaged, of = record, None  # that record averaged, which several clocks share
@@ -106,12 +148,13 @@ def read(
             # of what both share nothing changes
             if more.actuator is not less.actuator:
                 change = segments.average_at_instants(record, rows, more.actuator - less.actuator)
-                moved[..., : change.shape[-1], column] = change / apart
+                moved |= {(d, column): v / apart for d, v in enumerate(np.moveaxis(change, -1, 0))}
             if more.wind is not less.wind or more.state is not less.state:
                 change = segments.average_at_instants(record, rows, more.true_wind - less.true_wind)
-                moved[..., -2:, column] = change / apart
+                for d, values in enumerate(np.moveaxis(change, -1, 0), shape[2] - 2):
+                    moved[d, column] = values / apart
             if more.state is not less.state:
                 between = replace(more, state=more.state - less.state)
                 observed[..., column] = segments.means_of_bins(between, rows) / apart
         before = corrected((cause,), before, given)
-    return base, moved, observed
+    return base, Moved.of(shape, moved), observed

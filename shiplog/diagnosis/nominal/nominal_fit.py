@@ -22,7 +22,7 @@ import numpy as np
 
 from shiplog.diagnosis.linear import linearisation, segment_nodes, segments
 from shiplog.diagnosis.linear.linear_segments import Linear, Path, Wide
-from shiplog.diagnosis.linear.measurement_correction import read
+from shiplog.diagnosis.linear.measurement_correction import Moved, read
 from shiplog.diagnosis.linear.parameter_layout import Columns
 from shiplog.diagnosis.linear.segments import Cut, SegmentGrid
 from shiplog.diagnosis.noise import bounds, discrepancy, likelihood, noise_estimate
@@ -145,7 +145,7 @@ class _Campaign:
     model: Extended
     start: Start
     cut: Cut
-    moved: np.ndarray
+    moved: Moved
     observed: np.ndarray
     grid: SegmentGrid
     wide: Wide

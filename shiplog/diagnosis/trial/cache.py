@@ -12,13 +12,14 @@ from weakref import ref
 
 import numpy as np
 
+from shiplog.diagnosis.linear.measurement_correction import Moved
 from shiplog.diagnosis.linear.segments import Cut
 from shiplog.diagnosis.noise.likelihood import Modes, Weighed
 from shiplog.diagnosis.noise.remainder import Remainder
 from shiplog.diagnosis.trial.fitted import Start
 
 Numbers = Mapping[str, np.ndarray]
-Read = tuple[Cut, np.ndarray, np.ndarray]  # see `measurement_correction.read`
+Read = tuple[Cut, Moved, np.ndarray]  # see `measurement_correction.read`
 Key = tuple[tuple[str, ...], Remainder]  # labels of the included causes, and the remainder
 
 
