@@ -108,7 +108,7 @@ def linear(observed: Record) -> Linear:
     g = segments.grid(observed)
     cut = segments.cut(observed, residual_acceleration.covering(observed))
     path = linearisation.fit_path(model, THETA, cut, g, WIDE)
-    y, z = linearisation.simulated(model, THETA, cut, path, g)
+    y, z, _ = linearisation.simulated(model, THETA, cut, path, g)
     at = np.concatenate((np.zeros_like(path.start), path.acceleration.reshape(len(y), -1)), 1)
     e = cut.y - y + np.einsum("sbcz,sz->sbc", z, at)
     return Linear(cut, path, e, z, np.zeros((*e.shape, 0)))

@@ -9,6 +9,7 @@ import pytest
 from xdist.scheduler import LoadFileScheduling
 
 from shiplog.machine import disk_cache
+from shiplog.simulation.kernel import machine_code
 
 # Many small matrices: BLAS's threads would wait for each other. Set before numpy is loaded.
 for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NPROC"):
@@ -73,6 +74,12 @@ def pytest_runtest_makereport(item, call):
             if os.environ.get(variable) and word in reason:
                 report.outcome, report.longrepr = "failed", f"{variable} is set. {reason}"
     return report
+
+
+@pytest.fixture
+def by_jax(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No kernel: JAX runs the models."""
+    monkeypatch.setattr(machine_code, "level", lambda wanted=None: None)
 
 
 @pytest.fixture(scope="session")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from toy_ship import GRID, RECORD, ROWS, THETA, WIDE, Toy, nothing, path
 
-from shiplog.diagnosis.linear import linearisation, segments
+from shiplog.diagnosis.linear import jax_paths, linearisation, segments
 from shiplog.diagnosis.linear.linear_segments import Path
 from shiplog.diagnosis.linear.segments import Cut
 from shiplog.diagnosis.noise import likelihood
@@ -57,10 +57,10 @@ def test_what_training_holds_is_held_here():
     """Damping of 7 1/s, stable with four Euler steps a second: u = e^(-7t). With the instants' step
     alone the speed would grow by half from step to step."""
     cut, at, y = coasting()
-    found, columns = linearisation.simulated(Stiff(4), np.array([7.0]), cut, at, GRID)
+    found, columns, _ = linearisation.simulated(Stiff(4), np.array([7.0]), cut, at, GRID)
     assert found[:, 1:] == pytest.approx(y[:, 1:], abs=0.02)  # of the whole way, 1/7 m
     assert np.abs(columns[..., 1]).max() < 1.0
-    wild, _ = linearisation.simulated(Stiff(1), np.array([7.0]), cut, at, GRID)
+    wild, *_ = linearisation.simulated(Stiff(1), np.array([7.0]), cut, at, GRID)
     assert not np.isfinite(wild).all() or np.abs(wild).max() > 1e6
 
 
@@ -98,18 +98,16 @@ def test_a_ship_that_needs_no_finer_steps_keeps_its_numbers():
     model = mmg.MMG(ship)
     # the last row of what drives is the share of the campaign, before the wind
     plain = replace(cut, driven=np.delete(cut.driven, 3, axis=-1))
-    ((_, filled),) = linearisation.chunks(4)  # as many at a time, so that rounding is the same
-    start, acceleration, driven = map(filled, (at.start, at.interpolate(GRID), plain.driven))
-    states = np.asarray(
-        linearisation.states_along(model, theta, start, acceleration, driven, cut.step)
-    )[:4]
+    at_instants = at.interpolate(GRID)
+    states = jax_paths.states_along(model, theta, at.start, at_instants, plain.driven, cut.step)
     pairs = 0.5 * (states[:, 1:] + states[:, :-1])
     wanted = pairs.reshape(4, GRID.bins, -1, 6).mean(2)
-    for substeps in (1, 2):
-        found, _ = linearisation.simulated(
-            replace(model, substeps=substeps), theta, plain, at, GRID
-        )
-        assert np.array_equal(found, wanted)
+    one, two = (
+        linearisation.simulated(replace(model, substeps=substeps), theta, plain, at, GRID)[0]
+        for substeps in (1, 2)
+    )
+    assert one == pytest.approx(wanted, rel=1e-12, abs=1e-13)
+    assert np.array_equal(one, two)
 
 
 @pytest.mark.parametrize("wide", [None, WIDE], ids=("span", "wide"))

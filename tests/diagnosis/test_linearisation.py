@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from toy_ship import DAMP, GRID, RECORD, ROWS, SETTING, THETA, TURN, Coasting, Toy, path
 
-from shiplog.diagnosis.linear import linearisation, measurement_correction, segments
+from shiplog.diagnosis.linear import jax_paths, linearisation, measurement_correction, segments
 from shiplog.diagnosis.linear.linear_segments import Path
 from shiplog.models.causes.sensors import AntennaOffset, HeadingOffset
 from shiplog.models.causes.steering import RudderDelay, RudderLag
@@ -20,7 +20,7 @@ def test_the_integration_is_of_second_order():
     for step in (0.2, 0.1, 0.05):
         nodes = round(seconds / step) + 1
         start = np.array([[0.0, 1.0, 0.0, 0.0, 0.0, 0.0]])
-        states = linearisation.states_along(
+        states = jax_paths.states_along(
             Coasting(), np.array([k]), start, np.zeros((1, nodes, 3)), np.zeros((1, nodes, 3)), step
         )
         last = np.asarray(states)[0, -1]
@@ -35,7 +35,7 @@ def test_an_acceleration_is_added_to_the_models():
     nodes, step = 61, 0.2
     acceleration = np.tile([0.01, -0.02, 0.0], (1, nodes, 1))
     states = np.asarray(
-        linearisation.states_along(
+        jax_paths.states_along(
             Coasting(), np.zeros(1), np.zeros((1, 6)), acceleration, np.zeros((1, nodes, 3)), step
         )
     )
@@ -75,9 +75,7 @@ def gap(model, theta, at: Path, numbers) -> np.ndarray:
     record = measurement_correction.corrected(model.causes, RECORD, numbers)
     cut = segments.cut(record, ROWS)
     states = np.asarray(
-        linearisation.states_along(
-            model, theta, at.start, at.interpolate(GRID), cut.driven, cut.step
-        )
+        jax_paths.states_along(model, theta, at.start, at.interpolate(GRID), cut.driven, cut.step)
     )
     pairs = 0.5 * (states[:, 1:] + states[:, :-1])
     return cut.y - pairs.reshape(len(ROWS), GRID.bins, -1, 6).mean(2)

@@ -15,7 +15,7 @@ from shiplog.voyages.rows.timescale import NODE_STEP, Timescale
 def simulated(at: Path, theta: np.ndarray = THETA) -> Cut:
     """Segments whose measurements are the toy's own."""
     cut = segments.cut(RECORD, ROWS)
-    y, _ = linearisation.simulated(Toy(), theta, cut, at, GRID)
+    y, *_ = linearisation.simulated(Toy(), theta, cut, at, GRID)
     return replace(cut, y=y)
 
 
@@ -30,7 +30,7 @@ def test_nothing_is_left_of_what_the_model_made():
     assert np.array_equal(picked.z, found.z[1:3]) and len(picked.cut) == 2
 
 
-def test_slopes_of_a_smooth_model_go_straight_between_seconds():
+def test_slopes_of_a_smooth_model_go_straight_between_seconds(by_jax):
     """One in a second serves the toy, whose rudder goes slowly: what it bends by is within 1 % of
     what every node's slopes say, and what is constant stays exact."""
     at = replace(path(), acceleration=np.zeros((4, 3, GRID.nodes)))
@@ -61,7 +61,7 @@ def test_a_path_is_pulled_onto_a_known_acceleration():
     true = Path(RECORD.state[ROWS], np.tile(acceleration, (4, 1, 1)))
     cut = simulated(true)
     found = linearisation.fit_path(Toy(), THETA, cut, GRID, replace(WIDE, noise=0.01 * WIDE.noise))
-    y, _ = linearisation.simulated(Toy(), THETA, cut, found, GRID)
+    y, *_ = linearisation.simulated(Toy(), THETA, cut, found, GRID)
     assert y == pytest.approx(cut.y, abs=1e-4)
     assert found.start == pytest.approx(true.start, abs=2e-3)
     # within, where bins on both sides see a node
@@ -79,7 +79,7 @@ def test_a_path_is_pulled_until_it_converges():
         found = linearisation.fit_path(
             Toy(), THETA, cut, GRID, free, replace(true, start=start), rounds
         )
-        y, _ = linearisation.simulated(Toy(), THETA, cut, found, GRID)
+        y, *_ = linearisation.simulated(Toy(), THETA, cut, found, GRID)
         off[rounds] = np.abs(y - cut.y).max()
     assert off[linearisation.MOST_PULLS] < 1e-3 < 0.1 < off[2]
 
@@ -139,7 +139,7 @@ def test_a_path_is_pulled_on_a_longer_grid_too():
     true = Path(RECORD.state[rows], np.tile(acceleration, (2, 1, 1)))
     cut, moved, observed = measurement_correction.read(Toy(), SETTING, viewed, rows)
     assert cut.y.shape == observed.shape[:3] == (2, 15, 6) and moved.shape[1] == 151
-    y, _ = linearisation.simulated(Toy(), THETA, cut, true, g)
+    y, *_ = linearisation.simulated(Toy(), THETA, cut, true, g)
     cut = replace(cut, y=y)
     tight = replace(WIDE, noise=0.01 * WIDE.noise)
     found = linearisation.fit_path(Toy(), THETA, cut, g, tight, rounds=3)
@@ -155,7 +155,7 @@ def test_what_was_not_used_does_not_pull():
     wrong = np.where(used, cut.y, 1e3)
     bad = replace(cut, y=wrong, used=used)
     found = linearisation.fit_path(Toy(), THETA, bad, GRID, WIDE, true)
-    y, _ = linearisation.simulated(Toy(), THETA, bad, found, GRID)
+    y, *_ = linearisation.simulated(Toy(), THETA, bad, found, GRID)
     assert y == pytest.approx(cut.y, abs=1e-6)
 
 

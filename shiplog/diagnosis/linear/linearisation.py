@@ -14,24 +14,18 @@ segment in which the model still diverges is left out and counted (`Linear.lost`
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
 
-from shiplog.diagnosis.linear import variational_equations
 from shiplog.diagnosis.linear.linear_segments import Linear, Path, Wide
 from shiplog.diagnosis.linear.measurement_correction import Moved
 from shiplog.diagnosis.linear.segments import Cut, SegmentGrid
-from shiplog.machine.jit_cache import traced
-from shiplog.simulation.jax_rollouts import rate
+from shiplog.simulation.kernel import paths, rollouts
 from shiplog.simulation.window_series import Physical
 
-SEGMENTS_AT_A_TIME = 64
 STILLEST = 1e-3  # m, m/s, rad or rad/s: no ship is measured as still as that
 KIND = np.array(((0, 2), (1, 3), (0, 2), (1, 3), (4, 4), (5, 5)))  # channels of one width
 RUN_AWAY = 10.0  # expected distances from its measurement, beyond which a path has diverged
@@ -46,9 +40,6 @@ class Smooth(Physical, Protocol):
     def smooth(self) -> float:
         """s within which their derivatives may be taken to go straight; 0 where none do."""
         ...
-
-
-# --- integration: two-step Adams-Bashforth, one evaluation a step ---------------------------------
 
 
 def stable_steps(model: Smooth, step: float) -> int:
@@ -73,58 +64,6 @@ def _interpolate(values: np.ndarray, many: int) -> np.ndarray:
     return np.concatenate((inside, values[:, -1:]), axis=1)
 
 
-def _ab2(values: Array, before: Array, first) -> Array:
-    """(3/2) fₖ - (1/2) fₖ₋₁, the slope of a step of Adams-Bashforth; f₀ (Euler) of the first."""
-    return jnp.where(first, values, 1.5 * values - 0.5 * before)
-
-
-@traced
-def states_along(model, theta, start, acceleration, driven, step):
-    """xₖ₊₁ = xₖ + h ((3/2) fₖ - (1/2) fₖ₋₁), fₖ = ẋ(xₖ, uₖ; θ) + (0, a_u, 0, a_v, 0, a_r)ₖ: states
-    [S, K, 6] from `start` [S, 6] on, `step` h [s], with an `acceleration` a [S, K, 3] added.
-
-    driven   [S, K, A + 3]  uₖ: actuators, share of the campaign, true wind
-    """
-
-    def advance(carry, along):
-        state, before, first = carry
-        now, extra = along
-        slope = rate(model, theta, state, now[..., :-2], now[..., -2:])
-        slope = slope.at[..., jnp.array([1, 3, 5])].add(extra)
-        state_next = state + step * _ab2(slope, before, first)
-        return (state_next, slope, False), state
-
-    along = (jnp.moveaxis(driven, 1, 0), jnp.moveaxis(acceleration, 1, 0))
-    _, states = jax.lax.scan(advance, (start, jnp.zeros_like(start), True), along)
-    return jnp.moveaxis(states, 0, 1)
-
-
-@traced
-def _slopes(model, theta, states, driven):
-    """∂f/∂x [3, 6, S K], ∂f/∂u [3, D, S K] and ∂f/∂θ [3, P, S K], f = (u̇, v̇, ṙ) of the model.
-
-    In single precision, in half the time: six digits of a slope are more than a linearisation has,
-    and what it is about is simulated in double. Sample by sample last, each with a θ of its own,
-    and one row of ν̇ after another: that is what a compiler makes straight loops of.
-    """
-    model, theta, states, driven = jax.tree.map(
-        lambda values: jnp.asarray(values, jnp.float32), (model, theta, states, driven)
-    )
-    states, driven = (values.reshape(-1, values.shape[-1]).T for values in (states, driven))
-    count = states.shape[1]
-    by = (states, driven, jnp.broadcast_to(theta[:, None], (len(theta), count)))
-
-    def one(state, now, values):
-        return model.acceleration(values, state, now[:-2], now[-2:])
-
-    _, back = jax.vjp(jax.vmap(one, in_axes=1, out_axes=1), *by)
-    rows = jnp.broadcast_to(jnp.eye(3, dtype=jnp.float32)[..., None], (3, 3, count))
-    return jax.lax.map(back, rows)
-
-
-# --- in numpy: one record, in flat memory ---------------------------------------------------------
-
-
 def first_path(model: Smooth, theta: np.ndarray, segments: Cut, g: SegmentGrid) -> Path:
     """ξ* = y₀ - (y₁ - y₀)/2 and aⱼ* = Δν/Δt - f(x, u; θ) at the nodes: the measured acceleration,
     by differences of the means of bins, less the model's at the measured state."""
@@ -147,16 +86,13 @@ def accelerations(
 ) -> np.ndarray:
     """f(x, u; θ) [S, n, 3], the model's (u̇, v̇, ṙ) in m/s² and rad/s², at states x [S, n, 6] and
     what drives u [S, n, A + 3]."""
-    modelled = np.empty((*states.shape[:2], 3))
-    for part, filled in chunks(len(states)):
-        found = _accelerations(model, theta, filled(states), filled(driven))
-        modelled[part] = np.asarray(found)[: len(modelled[part])]
-    return modelled
+    inputs = np.concatenate((states, driven), 2).reshape(-1, states.shape[2] + driven.shape[2])
+    found = rollouts.values(model, theta, inputs)
+    if found is not None:
+        return found.reshape(*states.shape[:2], 3)
+    from shiplog.diagnosis.linear import jax_paths
 
-
-@traced
-def _accelerations(model, theta, states, driven):
-    return model.acceleration(theta, states, driven[..., :-2], driven[..., -2:])
+    return jax_paths.accelerations(model, theta, states, driven)
 
 
 def resampled(at: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
@@ -190,7 +126,7 @@ def fit_path(
     """
     path = path or first_path(model, theta, segments, g)
     for _ in range(rounds):
-        y, z = simulated(model, theta, segments, path, g)
+        y, z, _ = simulated(model, theta, segments, path, g)
         path, gained = _closer(path, segments.y - y, z, segments.used, wide, about)
         if gained < PULLED_NATS:
             break
@@ -264,23 +200,22 @@ def linear(
     wide      standard deviation of the path about its measurement: a path RUN_AWAY times that
               away has diverged; where it is not given, the span of the segments
     """
-    y, columns = simulated(model, theta, segments, path, g, moved)
-    lost = _lost(segments, y, columns, wide)
+    y, z, j = simulated(model, theta, segments, path, g, moved)
+    assert j is not None
+    lost = _lost(segments, y, (z, j), wide)
+    j[..., len(theta) - moved.shape[-1] :] -= observed
     if lost.any():
-        used = segments.used & ~lost[:, None, None]
-        segments = replace(segments, used=used)
-        y, columns = np.where(lost[:, None, None], segments.y, y), columns.copy()
-        columns[lost], observed = 0.0, np.where(lost[:, None, None, None], 0.0, observed)
-    size = 6 + 3 * g.nodes
-    *_, read = moved.shape
-    z, j = columns[..., :size].copy(), columns[..., size:].copy()
-    j[..., len(theta) - read :] -= observed
+        segments = replace(segments, used=segments.used & ~lost[:, None, None])
+        y = np.where(lost[:, None, None], segments.y, y)
+        z[lost], j[lost] = 0.0, 0.0
     e = segments.y - y + np.einsum("sbcz,sz->sbc", z, path.coordinates)
     e[lost] = 0.0  # columns of zeros times a path that is not finite are not zero
     return Linear(segments, path, e, z, j, lost)
 
 
-def _lost(segments: Cut, y: np.ndarray, columns: np.ndarray, wide: Wide | None) -> np.ndarray:
+def _lost(
+    segments: Cut, y: np.ndarray, columns: Sequence[np.ndarray], wide: Wide | None
+) -> np.ndarray:
     """[S] bool: where path or columns are not finite, or |y - y*| > RUN_AWAY √(σ₀² + σ²).
 
     Only measured bins count, and channels of one kind (both of position, both of velocity)
@@ -294,87 +229,52 @@ def _lost(segments: Cut, y: np.ndarray, columns: np.ndarray, wide: Wide | None) 
     with np.errstate(invalid="ignore", over="ignore"):
         off = np.where(segments.used, np.abs(segments.y - y), 0.0).max(1)
         near = (off <= RUN_AWAY * np.maximum(width, STILLEST)).all(-1)
-    return ~(near & np.isfinite(y).all((1, 2)) & np.isfinite(columns).all((1, 2, 3)))
+    known = [np.isfinite(some).all((1, 2, 3)) for some in columns]
+    return ~(near & np.isfinite(y).all((1, 2)) & np.logical_and.reduce(known))
 
 
-def chunks(count: int) -> Iterator[tuple[slice, Callable[[np.ndarray], np.ndarray]]]:
-    """SEGMENTS_AT_A_TIME of so many segments after the other, and how each chunk's values are
-    picked and filled up: one compilation serves all."""
-    for at in range(0, count, SEGMENTS_AT_A_TIME):
-        part = slice(at, min(at + SEGMENTS_AT_A_TIME, count))
-
-        def filled(values: np.ndarray, part: slice = part) -> np.ndarray:
-            own = values[part]
-            lack = SEGMENTS_AT_A_TIME - len(own)
-            return np.concatenate((own, np.repeat(own[-1:], lack, axis=0))) if lack else own
-
-        yield part, filled
-
-
-def _instant_slopes(model, theta, states, driven, step, *, coefficients) -> list[np.ndarray]:
-    """∂f/∂x, ∂f/∂u, ∂f/∂θ (`_slopes`) at every instant of a step, by segments [S, K, 3, 6 or D or
-    P; P only where `coefficients` are asked for]. Those of a model that is smooth and takes long (a
-    network) are worked out as often as they change, and go straight between:
-    A(tₖ) = A_left + (tₖ - t_left)/(t_right - t_left) (A_right - A_left)."""
-    instants = states.shape[1]
-    stride = max(round(model.smooth / step), 1)
-    at = np.unique(np.append(np.arange(0, instants, stride), instants - 1))
-    # one compilation serves both: it takes longer than all that it saves to leave θ out
-    *found, by_theta = _slopes(model, theta, states[:, at], driven[:, at])
-    found.append(by_theta if coefficients else np.zeros((3, 0, by_theta.shape[-1]), np.float32))
-    right = np.clip(np.searchsorted(at, np.arange(instants)), 1, len(at) - 1)
-    part = ((np.arange(instants) - at[right - 1]) / (at[right] - at[right - 1])).astype(np.float32)
-    every = []
-    for values in found:
-        values = np.asarray(values).reshape(*values.shape[:2], len(states), len(at))
-        if stride > 1:
-            left = values[..., right - 1]
-            values = left + part * (values[..., right] - left)
-        every.append(np.moveaxis(values, (2, 3), (0, 1)))
-    return every
-
-
-def simulated(model, theta, segments, path, g, moved=None):
-    """y* [S, B, 6] and its columns (Z | H) [S, B, 6, 6 + 3J (+ C)]: by start, accelerations at the
-    nodes, and θ where `moved` is given. Not finite where the model diverges."""
-    with np.errstate(all="ignore"):
-        return _every(model, theta, segments, path, g, moved)
-
-
-def _every(model, theta, segments, path, g, moved):
-    """`simulated`, chunk by chunk: y_b = (1/T) ∫ x dt over each bin of T s, by the trapezium."""
+def simulated(
+    model: Smooth,
+    theta: np.ndarray,
+    segments: Cut,
+    path: Path,
+    g: SegmentGrid,
+    moved: Moved | None = None,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """y* [S, B, 6], Z [S, B, 6, 6 + 3J] by start and accelerations at the nodes and, where `moved`
+    is given, H [S, B, 6, C] by θ. Means over bins, y_b = (1/T) ∫ x dt over each of T s, by the
+    trapezium. Not finite where the model diverges."""
     many = stable_steps(model, segments.step)
-    step = segments.step / many
-    acceleration, hats = path.interpolate(g), _interpolate(g.weights[None], many)[0]
-    per = many * (g.instants - 1) // g.bins
-    ys, columns = [], []
-    for part, filled in chunks(len(segments)):
-        driven = _interpolate(filled(segments.driven), many)
-        states = np.asarray(
-            states_along(
-                model,
-                theta,
-                filled(path.start),
-                _interpolate(filled(acceleration), many),
-                driven,
-                step,
-            )
-        )
-        keep = slice(part.stop - part.start)
-        by_state, by_driven, by_theta = _instant_slopes(
-            model, theta, states, driven, step, coefficients=moved is not None
-        )
-        states = states[keep]
-        how = (
-            np.zeros((*driven[keep].shape, 0))
-            if moved is None
-            else _interpolate(moved.dense(part), many)
-        )
-        pairs = 0.5 * (states[:, 1:] + states[:, :-1])
-        ys.append(pairs.reshape(len(states), g.bins, per, 6).mean(2))
-        columns.append(
-            variational_equations.columns(
-                states, by_state, by_driven, by_theta, how, hats, step, g.bins
-            )
-        )
-    return np.concatenate(ys), np.concatenate(columns)
+    along = _Along(
+        path.start, _interpolate(path.interpolate(g), many), _interpolate(segments.driven, many),
+        _interpolate(g.weights[None], many)[0], segments.step / many, g.bins, _series(moved, many),
+    )  # fmt: skip
+    found = paths.columns(model, theta, *along)
+    if found is not None:
+        return found
+    from shiplog.diagnosis.linear import jax_paths
+
+    with np.errstate(all="ignore"):
+        return jax_paths.columns(model, theta, *along)
+
+
+class _Along(NamedTuple):
+    """What segments are simulated with: see `kernel.paths.columns`."""
+
+    start: np.ndarray
+    acceleration: np.ndarray
+    driven: np.ndarray
+    hats: np.ndarray
+    step: float
+    bins: int
+    moved: tuple[np.ndarray, np.ndarray, int] | None
+
+
+def _series(moved: Moved | None, many: int) -> tuple[np.ndarray, np.ndarray, int] | None:
+    """Pairs, series [S, n, K] at so many instants for one, and how many numbers there are."""
+    if moved is None:
+        return None
+    series = moved.series
+    if many > 1:
+        series = np.moveaxis(_interpolate(np.moveaxis(series, 1, 2), many), 2, 1)
+    return moved.pairs, series, moved.shape[-1]

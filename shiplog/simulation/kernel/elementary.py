@@ -114,11 +114,21 @@ def _power_of_two(g: Graph, k: int) -> tuple[int, int]:
 
 def exp(g: Graph, x: int) -> int:
     """eˣ = 2ᵏ eʳ"""
-    k, left = _reduced(g, x, LN2)
+    return _grown(g, x, *_reduced(g, x, LN2), (-750.0, 710.0))
+
+
+def exp2(g: Graph, x: int) -> int:
+    """2ˣ = 2ᵏ e^(r ln 2)"""
+    k = g.apply("round", x)
+    return _grown(g, x, k, g.mul(g.sub(x, k), g.const(float(LN2))), (-1080.0, 1024.5))
+
+
+def _grown(g: Graph, x: int, k: int, left: int, range_: tuple[float, float]) -> int:
+    """2ᵏ eʳ; below the range 0, above it infinite."""
     value = g.add(g.const(1.0), g.mul(left, g.polynomial(left, EXPONENTIAL)))
     one, other = _power_of_two(g, k)
     found = g.mul(g.mul(value, one), other)
-    high, low = g.const(710.0), g.const(-750.0)
+    low, high = (g.const(v) for v in range_)
     found = g.select(g.apply("gt", x, high), g.const(math.inf), found)
     return g.select(g.apply("lt", x, low), g.const(0.0), found)
 
@@ -132,10 +142,6 @@ def expm1(g: Graph, x: int) -> int:
     found = g.add(g.mul(value, scale), g.sub(scale, one))
     found = g.select(g.apply("gt", x, g.const(690.0)), g.sub(exp(g, x), one), found)
     return g.select(g.apply("lt", x, g.const(-40.0)), g.const(-1.0), found)
-
-
-def exp2(g: Graph, x: int) -> int:
-    return exp(g, g.mul(x, g.const(float(LN2))))
 
 
 def log(g: Graph, x: int) -> int:

@@ -21,7 +21,7 @@ Nodes = np.ndarray  # of integers: nodes of the graph, in the array's shape
 
 # Of so many nodes the code takes longer to make than it saves: a wide network has kernels of its
 # own, and its model is JAX's.
-MOST_NODES = 40_000
+MOST_NODES = 10_000
 
 
 class UnknownOperation(Exception):
@@ -354,6 +354,7 @@ STRUCTURAL: dict[str, Callable[..., Any]] = {
     "transpose": lambda r, p, x: np.transpose(x, p["permutation"]),
     "slice": _slice,
     "split": _split,
+    "tile": lambda r, p, x: np.tile(x, p["reps"]),
     "stack": lambda r, p, *x: np.stack(x, p["axis"]),
     "concatenate": lambda r, p, *x: np.concatenate(x, p["dimension"]),
     "rev": lambda r, p, x: np.flip(x, p["dimensions"]),

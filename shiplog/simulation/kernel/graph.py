@@ -81,6 +81,9 @@ class Graph:
 
     def apply(self, kind: str, *operands: int) -> int:
         """The node of an operation, simplified."""
+        if kind in ("eq", "ne") and self.is_truth(operands[0]):
+            differ = self.apply("xor", *operands)
+            return differ if kind == "ne" else self.apply("not", differ)
         values = [self.value(node) for node in operands]
         if kind in KNOWN and all(v is not None for v in values):
             known = self._known(kind, values)

@@ -14,7 +14,6 @@ import logging
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,19 +23,19 @@ from shiplog.simulation.kernel.machine_code import Level, Library
 
 log = logging.getLogger(__name__)
 
-Write = Callable[[Any, Any], None]  # of a module and the sizes: the loops of a purpose
+Write = Callable[[Any, Any], None]  # of a module and each function's sizes: a purpose's loops
 
 
 @dataclass(frozen=True)
 class Purpose:
-    """What a kernel is for. `write` writes its loops; `by` says by which inputs f is
-    differentiated: "" for none, "state", or "all" (state, what drives, θ); `extra` are functions
-    of fewer derivatives in the same kernel, by name."""
+    """What a kernel is for. `write` writes its loops, of functions of the model by name: `by` says
+    by what ν̇ is differentiated, "" for nothing, "state", "state and θ", or "all": state, what
+    drives, and θ. `signatures` are the loops' names and a letter for each argument."""
 
     name: str
     write: Write
     functions: tuple[tuple[str, str], ...]  # name, by
-    signatures: tuple[tuple[str, str], ...]  # exported name, letters of its arguments
+    signatures: tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
@@ -84,6 +83,27 @@ def kernel(model: Any, purpose: Purpose, driven: int, coefficients: int) -> Kern
     key = (*kind, purpose.name, driven, coefficients, level.name)
     if key not in _known:
         _known[key] = _made(model, kind, purpose, driven, coefficients, level)
+    return _known[key]
+
+
+def plain(name: str, write: Callable[[Any], None], signatures: Sequence[tuple[str, str]]) -> Kernel:
+    """Loops that are no model's: `write` writes them into a module. Where the environment wants no
+    kernels of models, these are the portable ones."""
+    level = machine_code.level() or machine_code.LEVELS[-1]
+    key = (name, level.name)
+    if key not in _known:
+        whose = f"{machine_code.whose(level)} {name}"
+        found = machine_code.kept(whose)
+        if found is None:
+            from shiplog.simulation.kernel.writer import Module
+
+            module = Module(level.lanes)
+            write(module)
+            found = {}, machine_code.compiled(module.text, level)
+            machine_code.keep(whose, *found)
+        library = Library(found[1])
+        functions = {n: library.function(n, given) for n, given in signatures}
+        _known[key] = Kernel(library, functions, 0, level.lanes)
     return _known[key]
 
 
@@ -153,13 +173,15 @@ def written(
     }
     plain, module = Graph(), Module(lanes)
     flat = lowered(whole, [node for nodes in outputs.values() for node in nodes], plain)
-    functions, at = Functions(module, plain), 0
-    for name, nodes in outputs.items():
-        functions.write(name, flat[at : at + len(nodes)])
+    functions, sizes, at = Functions(module, plain), {}, 0
+    for name, by in purpose.functions:
+        nodes = flat[at : at + len(outputs[name])]
+        functions.write(name, nodes)
+        zeros = frozenset(i for i, node in enumerate(nodes) if plain.value(node) == 0.0)
+        sizes[name] = _sizes(driven, coefficients, zeros, by)
         at += len(nodes)
     constants = functions.prepare().constants
-    zeros = frozenset(i for i, node in enumerate(flat) if plain.value(node) == 0.0)
-    purpose.write(module, partial(_sizes, driven, coefficients, zeros))
+    purpose.write(module, sizes)
     return module.text, constants
 
 

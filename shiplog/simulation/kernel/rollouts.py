@@ -17,13 +17,13 @@ CHUNK = 8  # steps whose rows are kept before they are summed: 24 rows of 70 are
 
 
 def _write_paths(module: Any, sizes: Any) -> None:
-    made = Windows(module, sizes(""))
+    made = Windows(module, sizes["rates"])
     made.rollout("rates")
     made.values("rates")
 
 
 def _write_slopes(module: Any, sizes: Any) -> None:
-    made = Windows(module, sizes("state and θ"))
+    made = Windows(module, sizes["derivatives"])
     made.slopes("derivatives")
     made.normal("derivatives", VELOCITY_WEIGHTS)
 

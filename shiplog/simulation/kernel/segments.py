@@ -12,24 +12,26 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from shiplog.simulation.kernel.windows import STATES, Block, Sizes
+from shiplog.simulation.kernel.windows import STATES, Block, Rows, Sizes
 from shiplog.simulation.kernel.writer import DOUBLE, INT, POINTER, Function, Module, Value
 
 # Arguments of `paths_of` (without θ) and `columns_of`: pointers, whole numbers, the step.
 POINTERS = (
     "c", "start", "acceleration", "driven", "hats", "begun", "moved", "pairs", "y", "z", "j", "work"
 )  # fmt: skip
+GIVEN = ("slopes", "states", "hats", "begun", "moved", "pairs", "z", "j", "work")
 COUNTS = ("S", "K", "bins", "per", "J", "C", "Q", "n")
 
 
 @dataclass(frozen=True)
 class Step:
-    """What all columns of a step share: cos ψ, sin ψ, ∂(ẋ₀, ẏ₀)/∂ψ, A's rows of u, v and r without
-    what is zero whatever happens, and the weights of the two slopes."""
+    """What all columns of a step share: cos ψ, sin ψ, ẋ₀ and ẏ₀, A's rows of u, v and r without
+    what is zero whatever happens, the weights of the two slopes, and that of a mean."""
 
     cos: Value
     sin: Value
-    by_heading: tuple[Value, Value]
+    north: Value
+    east: Value
     rows: tuple[tuple[tuple[int, Value], ...], ...]
     new: Value
     old: Value
@@ -44,26 +46,49 @@ class Segments:
 
     def write(self, name: str, function: str, numbers: bool) -> None:
         """Means over bins y [S, B, 6], by start and nodes z [S, B, 6, 6 + 3J] and, with `numbers`,
-        by θ j [S, B, 6, C]; `work` holds three columns of 6, and one of 3, for each of them."""
+        by θ j [S, B, 6, C]; `work` holds four times six vectors for each of these columns."""
         arguments = [(n, POINTER) for n in POINTERS] + [(n, INT) for n in COUNTS]
         with self.module.function(name, [*arguments, ("h", DOUBLE)]) as (f, values):
             given = dict(zip([*POINTERS, *COUNTS, "h"], values, strict=True))
-            x, out = f.reserve(self.sizes.inputs), f.reserve(max(self.sizes.outputs, 5))
+            x, out = f.reserve(self.sizes.inputs), f.reserve(self.sizes.outputs)
             before, mean = f.reserve(STATES), f.reserve(STATES)
             f.call(f"{function}_fill", given["c"], out)
-            with f.loop(given["S"], 0, self.module.lanes) as first:
+            with f.loop(given["S"], 0, self.module.lanes, outer=True) as first:
                 block = Block(f, first, given["S"])
                 loops = _Loops(f, self.sizes, given, block, x, out, before, mean, numbers)
                 loops.begin()
-                with f.loop(given["bins"]) as bin_:
+                with f.loop(given["bins"], outer=True) as bin_:
                     loops.clear_means()
-                    with f.loop(given["per"]) as part:
+                    with f.loop(given["per"], outer=True) as part:
                         k = bin_ * given["per"] + part
                         loops.inputs(k)
                         f.call(function, x, given["c"], out)
                         step = loops.step(k)
                         loops.columns(k, step)
                         loops.path(k, step)
+                    loops.keep(bin_)
+
+    def write_given(self, name: str) -> None:
+        """The same columns of slopes that are known along a path, without the path: `states`
+        [S, K, 6], and `slopes` [S, K, …] as the function of a model writes them."""
+        arguments = [(n, POINTER) for n in GIVEN] + [(n, INT) for n in COUNTS]
+        with self.module.function(name, [*arguments, ("h", DOUBLE)]) as (f, values):
+            given = dict(zip([*GIVEN, *COUNTS, "h"], values, strict=True))
+            x, out = f.reserve(STATES), f.reserve(self.sizes.outputs)
+            with f.loop(given["S"], 0, self.module.lanes, outer=True) as first:
+                block = Block(f, first, given["S"])
+                loops = _Loops(f, self.sizes, given, block, x, out, x, x, numbers=True)
+                loops.begin_columns()
+                with f.loop(given["bins"], outer=True) as bin_:
+                    loops.clear_means()
+                    with f.loop(given["per"], outer=True) as part:
+                        k = bin_ * given["per"] + part
+                        for i in range(STATES):
+                            f.store_lanes(loops.rows["states"].gathered(k * STATES + i), x, i)
+                        with f.loop(self.sizes.outputs) as i:
+                            place = k * self.sizes.outputs + i
+                            f.store_lanes(loops.rows["slopes"].gathered(place), out, i)
+                        loops.columns(k, loops.step(k))
                     loops.keep(bin_)
 
 
@@ -75,13 +100,21 @@ class _Loops:
         self, f: Function, sizes: Sizes, given: dict[str, Value], block: Block, x: Value,
         out: Value, before: Value, mean: Value, numbers: bool,
     ) -> None:  # fmt: skip
-        self.f, self.sizes, self.given, self.block = f, sizes, given, block
+        self.f, self.sizes, self.given = f, sizes, given
         self.x, self.out, self.before, self.mean = x, out, before, mean
         self.numbers = numbers
         self.nodes = given["J"]
         self.of_z = self.nodes * 3 + STATES
         self.width = self.of_z + given["C"] if numbers else self.of_z
         self.work = given["work"]
+        bins, instants = given["bins"] * STATES, given["K"]
+        strides = {
+            "start": STATES, "driven": instants * sizes.driven, "acceleration": instants * 3,
+            "states": instants * STATES, "slopes": instants * sizes.outputs,
+            "moved": instants * given["n"], "y": bins, "z": bins * self.of_z,
+            "j": bins * given["C"],
+        }  # fmt: skip
+        self.rows = {n: block.rows(given[n], by) for n, by in strides.items() if n in given}
 
     def _at(self, kind: int, row: int, column: Value | int) -> Value:
         """Place of a column's number in `work`: kind 0 now, 1 slope before, 2 sum, 3 added."""
@@ -92,26 +125,29 @@ class _Loops:
             self.f.store_lanes(self.f.lanes(0.0), self.work, i)
 
     def begin(self) -> None:
-        """ξ, and δ(0) = (I | 0 | 0)."""
+        """ξ, and its columns."""
         f = self.f
-        self._clear(f.int(0), self.width * (2 * STATES))
+        self.begin_columns()
         for i in range(STATES):
-            f.store_lanes(f.lanes(1.0), self.work, self._at(0, i, i))
-            begun = self.block.gathered(self.given["start"], f.int(STATES), i)
-            f.store_lanes(begun, self.x, i)
+            f.store_lanes(self.rows["start"].gathered(i), self.x, i)
             f.store_lanes(f.lanes(0.0), self.before, i)
+
+    def begin_columns(self) -> None:
+        """δ(0) = (I | 0 | 0)"""
+        self._clear(self.f.int(0), self.width * (2 * STATES))
+        for i in range(STATES):
+            self.f.store_lanes(self.f.lanes(1.0), self.work, self._at(0, i, i))
 
     def clear_means(self) -> None:
         self._clear(self.width * (2 * STATES), self.width * STATES)
-        for i in range(STATES):
-            self.f.store_lanes(self.f.lanes(0.0), self.mean, i)
+        if "y" in self.rows:
+            for i in range(STATES):
+                self.f.store_lanes(self.f.lanes(0.0), self.mean, i)
 
     def inputs(self, k: Value) -> None:
         count = self.sizes.driven
-        stride = self.given["K"] * count
         for d in range(count):
-            one = self.block.gathered(self.given["driven"], stride, k * count + d)
-            self.f.store_lanes(one, self.x, STATES + d)
+            self.f.store_lanes(self.rows["driven"].gathered(k * count + d), self.x, STATES + d)
 
     def step(self, k: Value) -> Step:
         f, sizes, out = self.f, self.sizes, self.out
@@ -130,20 +166,15 @@ class _Loops:
             for row in range(3)
         )
         half = f.number(0.5) / f.put(f"sitofp i64 {self.given['per'].text} to double", DOUBLE)
-        zero = f.number(0.0)
-        old = f.spread(euler.chosen(zero, h * -0.5))
-        return Step(cos, sin, (zero - east, north), rows, new, old, f.spread(half))
+        old = f.spread(euler.chosen(f.number(0.0), h * -0.5))
+        return Step(cos, sin, north, east, rows, new, old, f.spread(half))
 
     def path(self, k: Value, step: Step) -> None:
         """The state, a step on, with the acceleration of the path's nodes."""
         f, x, out = self.f, self.x, self.out
-        extra = [
-            self.block.gathered(self.given["acceleration"], self.given["K"] * 3, k * 3 + q)
-            for q in range(3)
-        ]
-        east_rate, north = step.by_heading
+        extra = [self.rows["acceleration"].gathered(k * 3 + q) for q in range(3)]
         rates = (
-            north, f.load_lanes(out, 0) + extra[0], f.lanes(0.0) - east_rate,
+            step.north, f.load_lanes(out, 0) + extra[0], step.east,
             f.load_lanes(out, 1) + extra[1], f.load_lanes(x, 5), f.load_lanes(out, 2) + extra[2],
         )  # fmt: skip
         for i, rate in enumerate(rates):
@@ -181,11 +212,10 @@ class _Loops:
             with f.loop(causes) as i:
                 own = f.load_lanes(self.out, first + i + (by_theta + row * P))
                 f.store_lanes(own, self.work, self._at(3, row, i))
-        with f.loop(given["n"]) as pair:  # that what drives changes with
+        with f.loop(given["n"], outer=True) as pair:  # that what drives changes with
             d = f.load(given["pairs"], pair * 2, INT)
             i = f.load(given["pairs"], pair * 2 + 1, INT)
-            series = given["K"] * given["n"]
-            moved = self.block.gathered(given["moved"], series, pair * given["K"] + k)
+            moved = self.rows["moved"].gathered(pair * given["K"] + k)
             for row in range(3):
                 slope = f.load_lanes(self.out, d + (sizes.slopes + row * sizes.by + STATES))
                 place = self._at(3, row, i)
@@ -199,7 +229,6 @@ class _Loops:
         f = self.f
         at = [f.load_lanes(self.work, self._at(0, i, column)) for i in range(STATES)]
         _, du, _, dv, dpsi, dr = at
-        turned_north, turned_east = step.by_heading
         motion = []
         for row in range(3):
             found = pushed[row]
@@ -207,8 +236,8 @@ class _Loops:
                 found = found + slope * at[i]
             motion.append(found)
         changes = (
-            step.cos * du - step.sin * dv + turned_north * dpsi, motion[0],
-            step.sin * du + step.cos * dv + turned_east * dpsi, motion[1], dr, motion[2],
+            step.cos * du - step.sin * dv - step.east * dpsi, motion[0],
+            step.sin * du + step.cos * dv + step.north * dpsi, motion[1], dr, motion[2],
         )  # fmt: skip
         for i, change in enumerate(changes):
             was = f.load_lanes(self.work, self._at(1, i, column))
@@ -221,17 +250,16 @@ class _Loops:
 
     def keep(self, bin_: Value) -> None:
         """The bin's means into y, z and j."""
-        f, given = self.f, self.given
-        bins = given["bins"]
-        means = [f.load_lanes(self.mean, i) for i in range(STATES)]
-        self.block.scattered(means, given["y"], bins * STATES, bin_ * STATES)
-        self._rows(bin_, given["z"], f.int(0), self.of_z)
+        f = self.f
+        if "y" in self.rows:
+            means = [f.load_lanes(self.mean, i) for i in range(STATES)]
+            self.rows["y"].scattered(means, bin_ * STATES)
+        self._kept(bin_, self.rows["z"], f.int(0), self.of_z)
         if self.numbers:
-            self._rows(bin_, given["j"], self.of_z, given["C"])
+            self._kept(bin_, self.rows["j"], self.of_z, self.given["C"])
 
-    def _rows(self, bin_: Value, pointer: Value, first: Value, count: Value) -> None:
+    def _kept(self, bin_: Value, to: Rows, first: Value, count: Value) -> None:
         f, lanes = self.f, self.f.module.lanes
-        stride = self.given["bins"] * STATES * count
         whole = count / lanes * lanes
         for i in range(STATES):
             offset = (bin_ * STATES + i) * count
@@ -239,7 +267,7 @@ class _Loops:
                 rows = [
                     f.load_lanes(self.work, self._at(2, i, first + at) + q) for q in range(lanes)
                 ]
-                self.block.scattered(rows, pointer, stride, offset + at)
+                to.scattered(rows, offset + at)
             with f.loop(count, whole) as at:
                 row = f.load_lanes(self.work, self._at(2, i, first + at))
-                self.block.scattered([row], pointer, stride, offset + at)
+                to.scattered([row], offset + at)

@@ -58,20 +58,31 @@ class Block:
         last = count - 1
         self.windows = [f.smaller(first + lane, last) for lane in range(f.module.lanes)]
 
-    def gathered(self, pointer: Value, stride: Value, offset: Value | int) -> Value:
-        """Number `offset` of each window's, `stride` apart."""
-        return self.f.together([self.f.load(pointer, w * stride + offset) for w in self.windows])
+    def rows(self, pointer: Value, stride: Value | int) -> Rows:
+        """Each window's own part of an array, `stride` numbers apart."""
+        return Rows(self.f, [self.f.at(pointer, window * stride) for window in self.windows])
 
-    def scattered(
-        self, rows: Sequence[Value], pointer: Value, stride: Value, offset: Value | int
-    ) -> None:
-        """A vector for each of some numbers in a row, to each window's place for them."""
+
+@dataclass(frozen=True)
+class Rows:
+    """A pointer for each lane."""
+
+    f: Function
+    pointers: Sequence[Value]
+
+    def gathered(self, offset: Value | int) -> Value:
+        """Number `offset` of each."""
+        return self.f.together([self.f.load(pointer, offset) for pointer in self.pointers])
+
+    def scattered(self, values: Sequence[Value], offset: Value | int) -> None:
+        """A vector for each of some numbers in a row, to every lane's place for them."""
         f, lanes = self.f, self.f.module.lanes
-        for at in range(0, len(rows), lanes):
-            part = list(rows[at : at + lanes])
+        for at in range(0, len(values), lanes):
+            part = list(values[at : at + lanes])
             filled = part + [f.lanes(0.0)] * (lanes - len(part))
-            for window, row in zip(self.windows, f.transposed(filled), strict=True):
-                f.store(narrowed(f, row, len(part)), pointer, window * stride + (offset + at))
+            place = offset + at
+            for pointer, row in zip(self.pointers, f.transposed(filled), strict=True):
+                f.store(narrowed(f, row, len(part)), pointer, place)
 
 
 def narrowed(f: Function, row: Value, count: int) -> Value:
@@ -118,16 +129,25 @@ class Windows:
     def __init__(self, module: Module, sizes: Sizes) -> None:
         self.module, self.sizes = module, sizes
 
-    def _driven(self, f: Function, block: Block, given: dict[str, Value], k: Value, x: Value):
+    def _rows(self, block: Block, given: dict[str, Value]) -> dict[str, Rows]:
+        """Each window's part of what is given."""
+        instants = given["I"]
+        widths = {
+            "start": STATES, "actuator": given["I"] * (self.sizes.driven - 2),
+            "wind": given["I"] * 2, "dt": given["I"] - 1, "steps": instants, "weight": 1,
+            "states": instants * STATES, "measured": instants * STATES,
+            "slopes": instants * (STATES * self.sizes.coefficients),
+        }  # fmt: skip
+        return {n: block.rows(given[n], width) for n, width in widths.items() if n in given}
+
+    def _driven(self, f: Function, rows: dict[str, Rows], given: dict[str, Value], k, x) -> Value:
         """Inputs of step k into x, and its length over the substeps."""
         actuators = self.sizes.driven - 2
         for i in range(actuators):
-            one = block.gathered(given["actuator"], given["I"] * actuators, k * actuators + i)
-            f.store_lanes(one, x, STATES + i)
+            f.store_lanes(rows["actuator"].gathered(k * actuators + i), x, STATES + i)
         for i in range(2):
-            one = block.gathered(given["wind"], given["I"] * 2, k * 2 + i)
-            f.store_lanes(one, x, STATES + actuators + i)
-        return block.gathered(given["dt"], given["I"] - 1, k) * given["part"]
+            f.store_lanes(rows["wind"].gathered(k * 2 + i), x, STATES + actuators + i)
+        return rows["dt"].gathered(k) * given["part"]
 
     def rollout(self, function: str) -> None:
         """States [N, I, 6] of `function`, ν̇ without derivatives."""
@@ -139,20 +159,19 @@ class Windows:
             given = dict(zip([n for n, _ in arguments], values, strict=True))
             x, out = f.reserve(self.sizes.inputs), f.reserve(5)
             f.call(f"{function}_fill", given["c"], out)
-            with f.loop(given["N"], 0, self.module.lanes) as first:
-                block = Block(f, first, given["N"])
-                size = given["I"] * STATES
-                begun = [block.gathered(given["start"], f.int(STATES), i) for i in range(STATES)]
+            with f.loop(given["N"], 0, self.module.lanes, outer=True) as first:
+                rows = self._rows(Block(f, first, given["N"]), given)
+                begun = [rows["start"].gathered(i) for i in range(STATES)]
                 for i, value in enumerate(begun):
                     f.store_lanes(value, x, i)
-                block.scattered(begun, given["states"], size, f.int(0))
-                with f.loop(given["I"] - 1) as k:
-                    h = self._driven(f, block, given, k, x)
-                    with f.loop(given["substeps"]):
+                rows["states"].scattered(begun, 0)
+                with f.loop(given["I"] - 1, outer=True) as k:
+                    h = self._driven(f, rows, given, k, x)
+                    with f.loop(given["substeps"], outer=True):
                         f.call(function, x, given["c"], out)
                         advance(f, x, out, step_of(f, x, out, h))
                     now = [f.load_lanes(x, i) for i in range(STATES)]
-                    block.scattered(now, given["states"], size, k * STATES + STATES)
+                    rows["states"].scattered(now, k * STATES + STATES)
 
     def values(self, function: str) -> None:
         """ν̇ [n, 3] at inputs [n, columns of x]."""
@@ -160,13 +179,13 @@ class Windows:
         with self.module.function("values", arguments) as (f, (c, inputs, found, n)):
             x, out = f.reserve(self.sizes.inputs), f.reserve(5)
             f.call(f"{function}_fill", c, out)
-            with f.loop(n, 0, self.module.lanes) as first:
-                block, width = Block(f, first, n), f.int(self.sizes.inputs)
-                for i in range(self.sizes.inputs):
-                    f.store_lanes(block.gathered(inputs, width, i), x, i)
+            with f.loop(n, 0, self.module.lanes, outer=True) as first:
+                block, width = Block(f, first, n), self.sizes.inputs
+                given, rates = block.rows(inputs, width), block.rows(found, 3)
+                for i in range(width):
+                    f.store_lanes(given.gathered(i), x, i)
                 f.call(function, x, c, out)
-                rates = [f.load_lanes(out, i) for i in range(3)]
-                block.scattered(rates, found, f.int(3), f.int(0))
+                rates.scattered([f.load_lanes(out, i) for i in range(3)], 0)
 
     def slopes(self, function: str) -> None:
         """States [N, I, 6] and their derivatives by all coefficients [N, I, 6, P]."""
@@ -181,28 +200,27 @@ class Windows:
             x, out = f.reserve(self.sizes.inputs), f.reserve(self.sizes.outputs)
             s = given["work"]  # [6, padded]
             f.call(f"{function}_fill", given["c"], out)
-            with f.loop(given["N"], 0, self.module.lanes) as first:
-                block = Block(f, first, given["N"])
-                size = given["I"] * STATES
-                begun = [block.gathered(given["start"], f.int(STATES), i) for i in range(STATES)]
+            with f.loop(given["N"], 0, self.module.lanes, outer=True) as first:
+                rows = self._rows(Block(f, first, given["N"]), given)
+                begun = [rows["start"].gathered(i) for i in range(STATES)]
                 for i, value in enumerate(begun):
                     f.store_lanes(value, x, i)
-                block.scattered(begun, given["states"], size, f.int(0))
+                rows["states"].scattered(begun, 0)
                 with f.loop(f.int(STATES * padded)) as i:
                     f.store_lanes(f.lanes(0.0), s, i)
                 with f.loop(f.int(STATES * P)) as i:
-                    for window in block.windows:
-                        f.store(f.number(0.0), given["slopes"], window * (size * P) + i)
-                with f.loop(given["I"] - 1) as k:
-                    h = self._driven(f, block, given, k, x)
-                    with f.loop(given["substeps"]):
+                    for pointer in rows["slopes"].pointers:
+                        f.store(f.number(0.0), pointer, i)
+                with f.loop(given["I"] - 1, outer=True) as k:
+                    h = self._driven(f, rows, given, k, x)
+                    with f.loop(given["substeps"], outer=True):
                         f.call(function, x, given["c"], out)
                         step = step_of(f, x, out, h)
                         self._sensitivities(f, s, padded, out, step, f.int(P), None)
                         advance(f, x, out, step)
                     now = [f.load_lanes(x, i) for i in range(STATES)]
-                    block.scattered(now, given["states"], size, k * STATES + STATES)
-                    self._kept(f, block, s, padded, given["slopes"], size * P, (k + 1) * (6 * P))
+                    rows["states"].scattered(now, k * STATES + STATES)
+                    self._kept(f, rows["slopes"], s, padded, (k + 1) * (STATES * P))
 
     def _sensitivities(self, f, s, padded, out, step, count, columns) -> None:
         """sₖ₊₁ of `count` coefficients; the places of their columns, or None for all in order."""
@@ -228,17 +246,17 @@ class Windows:
                     moved = moved + a * (dx, du, dy, dv, dpsi, dr)[i]
                 f.store_lanes(now + moved, s, p + (2 * row + 1) * padded)
 
-    def _kept(self, f, block, s, padded, slopes, stride, offset) -> None:
+    def _kept(self, f: Function, slopes: Rows, s: Value, padded: int, offset: Value) -> None:
         """Sensitivities into a row of each window's [6, P]."""
         P, lanes = self.sizes.coefficients, self.module.lanes
         for i in range(STATES):
             with f.loop(f.int(P // lanes * lanes), 0, lanes) as p:
                 rows = [f.load_lanes(s, p + (i * padded + j)) for j in range(lanes)]
-                block.scattered(rows, slopes, stride, offset + i * P + p)
+                slopes.scattered(rows, offset + i * P + p)
             at = P // lanes * lanes
             if at < P:
                 rows = [f.load_lanes(s, f.int(i * padded + j)) for j in range(at, P)]
-                block.scattered(rows, slopes, stride, offset + (i * P + at))
+                slopes.scattered(rows, offset + (i * P + at))
 
     def normal(self, function: str, weights: Sequence[float]) -> None:
         """Loss [N], half its gradient [N, n], and weighted JᵀJ [blocks, 4, 4] a lane each, by n
@@ -266,20 +284,20 @@ class Windows:
             x, out = f.reserve(self.sizes.inputs), f.reserve(self.sizes.outputs)
             f.call(f"{function}_fill", given["c"], out)
             total = f.reserve(1)
-            with f.loop(given["N"], 0, self.module.lanes) as first:
+            with f.loop(given["N"], 0, self.module.lanes, outer=True) as first:
                 self._normal_of_block(f, given, function, weights, first, x, out, total)
 
     def _normal_of_block(self, f, given, function, weights, first, x, out, total) -> None:
         padded, n, s = given["padded"], given["n"], given["s"]
-        block = Block(f, first, given["N"])
-        size = given["I"] * STATES
+        # `rows` among what is given are those of JᵀJ
+        windows = self._rows(Block(f, first, given["N"]), given)
         for i in range(STATES):
-            f.store_lanes(block.gathered(given["measured"], size, i), x, i)
+            f.store_lanes(windows["measured"].gathered(i), x, i)
         # windows that fill a block up have no weight of their own
         valid = [(first + lane).compared("slt", given["N"]) for lane in range(self.module.lanes)]
         weight = f.together([
-            one.chosen(f.load(given["weight"], w), 0.0)
-            for one, w in zip(valid, block.windows, strict=True)
+            one.chosen(f.load(pointer), 0.0)
+            for one, pointer in zip(valid, windows["weight"].pointers, strict=True)
         ])  # fmt: skip
         used, root = weight.compared("ogt", 0.0), f.intrinsic("sqrt", weight)
         with f.loop(padded * STATES) as i:
@@ -290,20 +308,20 @@ class Windows:
             f.store_lanes(f.lanes(0.0), pull, base + i)
         f.store_lanes(f.lanes(0.0), total)
         steps = given["I"] - 1
-        with f.loop((steps + given["chunk"] - 1) / given["chunk"]) as part:
+        with f.loop((steps + given["chunk"] - 1) / given["chunk"], outer=True) as part:
             begin = part * given["chunk"]
             end = f.smaller(begin + given["chunk"], steps)
-            with f.loop(end, begin) as k:
-                h = self._driven(f, block, given, k, x)
-                with f.loop(given["substeps"]):
+            with f.loop(end, begin, outer=True) as k:
+                h = self._driven(f, windows, given, k, x)
+                with f.loop(given["substeps"], outer=True):
                     f.call(function, x, given["c"], out)
                     step = step_of(f, x, out, h)
                     self._sensitivities(f, s, padded, out, step, n, given["columns"])
                     advance(f, x, out, step)
-                time = block.gathered(given["steps"], given["I"], k + 1)
+                time = windows["steps"].gathered(k + 1)
                 width = f.intrinsic("sqrt", time)
                 for q, (place, w) in enumerate(zip(VELOCITY_IN_STATE, weights, strict=True)):
-                    y = block.gathered(given["measured"], size, k * STATES + (STATES + place))
+                    y = windows["measured"].gathered(k * STATES + (STATES + place))
                     scale = width * w
                     error = (f.load_lanes(x, place) - y) * scale
                     f.store_lanes(f.load_lanes(total) + error * error, total)

@@ -264,13 +264,21 @@ class Function:
     # --- control ----------------------------------------------------------------------------
 
     @contextmanager
-    def loop(self, stop: Value | int, start: Value | int = 0, step: int = 1) -> Iterator[Value]:
-        """for index from start, below stop, by step."""
+    def loop(
+        self, stop: Value | int, start: Value | int = 0, step: int = 1, outer: bool = False
+    ) -> Iterator[Value]:
+        """for index from start, below stop, by step.
+
+        outer   of a loop with others in it: its index is kept in memory, where LLVM does not look
+                for what could be strength-reduced. In nests of loops that look takes seconds.
+        """
         first, last = (v if isinstance(v, Value) else self.int(v) for v in (start, stop))
         tag = self.name()
         head, body, end = f"head.{tag}", f"body.{tag}", f"end.{tag}"
         index = Value(self, f"%i.{tag}", INT)
-        before = self._block
+        before, slot = self._block, self.reserve() if outer else None
+        if slot is not None:
+            self.say(f"store volatile i64 {first.text}, ptr {slot.text}")
         self.say(f"br label %{head}")
         place = len(self.lines)  # of the head, whose second edge is known at the end
         self.lines += ["", "", "", ""]
@@ -278,10 +286,15 @@ class Function:
         yield index
         latch = self._block
         after = index + step
+        if slot is None:
+            here = f"phi i64 [ {first.text}, %{before} ], [ {after.text}, %{latch} ]"
+        else:
+            here = f"load volatile i64, ptr {slot.text}"
+            self.say(f"store volatile i64 {after.text}, ptr {slot.text}")
         self.say(f"br label %{head}")
         self.lines[place : place + 4] = [
             f"{head}:",
-            f"  {index.text} = phi i64 [ {first.text}, %{before} ], [ {after.text}, %{latch} ]",
+            f"  {index.text} = {here}",
             f"  %more.{tag} = icmp slt i64 {index.text}, {last.text}",
             f"  br i1 %more.{tag}, label %{body}, label %{end}",
         ]
