@@ -121,11 +121,14 @@ class Reader:
     def _moved(self, equation: Any, given: list[Nodes]) -> Nodes:
         """What moves elements to known places, by JAX itself: of the nodes' integers."""
         name = equation.primitive.name
-        places = [self.numbers(nodes, name).astype(np.int32) for nodes in given[1:]]
-        if name in ("dynamic_update_slice", "scatter", "pad"):  # their second operand is elements
-            places[0] = given[1]
         moved = equation.primitive.bind(
-            given[0].astype(np.int32), *(p.astype(np.int32) for p in places), **equation.params
+            *(
+                nodes.astype(np.int32)
+                if i in MOVED_BY_JAX[name]
+                else self.numbers(nodes, name).astype(np.int32)
+                for i, nodes in enumerate(given)
+            ),
+            **equation.params,
         )
         return np.asarray(moved, dtype=np.int64)
 
@@ -363,7 +366,11 @@ STRUCTURAL: dict[str, Callable[..., Any]] = {
     "dot_general": _product,
     "device_put": lambda r, p, *x: list(x),
 }
-MOVED_BY_JAX = frozenset({"gather", "dynamic_slice", "dynamic_update_slice", "scatter", "pad"})
+# Which operands are elements that are moved; the others say where.
+MOVED_BY_JAX = {
+    "gather": (0,), "dynamic_slice": (0,), "dynamic_update_slice": (0, 1), "scatter": (0, 2),
+    "pad": (0, 1),
+}  # fmt: skip
 
 
 def trace(function: Callable[..., Array], *shapes: tuple[int, ...]) -> Any:

@@ -116,7 +116,9 @@ PAIRS = {
 @pytest.mark.parametrize("name", PAIRS)
 def test_functions_are_those_of_the_c_library(name, level):
     wanted, x = PAIRS[name]
-    assert run(getattr(jnp, name), level, x)[:, 0] == pytest.approx(wanted(x), rel=2e-15, abs=1e-300)
+    assert run(getattr(jnp, name), level, x)[:, 0] == pytest.approx(
+        wanted(x), rel=2e-15, abs=1e-300
+    )
 
 
 def test_functions_of_two(level):
@@ -159,14 +161,23 @@ CURVES = {
     "powers": lambda x, y: (1.5 + x * x) ** y + x**3 + (2.0 + jnp.sin(y)) ** -2 + jnp.cbrt(y),
     "angles": lambda x, y: jnp.arcsin(0.3 * jnp.sin(x)) + jnp.arccos(0.2 * y) + jnp.tan(0.2 * x),
     "hyperbolic": lambda x, y: jnp.sinh(x) * jnp.cosh(y) + jnp.exp2(x),
-    "corners": lambda x, y: jnp.abs(x) * jnp.maximum(x, y) + jnp.minimum(x * y, 0.3) + jnp.sign(y),
+    "corners": lambda x, y: jnp.abs(x) * jnp.maximum(x, y) + jnp.minimum(x * y, 0.3) - jnp.sign(y),
     "choice": lambda x, y: jnp.where(x > y, x * x, y) + jnp.where((x > 0) & ~(y > 0), x, -y),
-    "sums": lambda x, y: jnp.cumsum(jnp.stack((x, y, x * y)))[::-1].prod() + jnp.array([x, y]).max(),
+    "sums": lambda x, y: (
+        jnp.cumsum(jnp.stack((x, y, x * y)))[::-1].prod() + jnp.stack((x, y)).max()
+    ),
     "matrix": lambda x, y: (
-        jnp.array([[1.0, 2.0], [0.5, -1.0]]) @ jnp.stack((x, y))
-    ) @ jnp.tile(jnp.stack((x, y * y)), 2)[jnp.array([1, 2])],
-    "loop": lambda x, y: jax.lax.fori_loop(0, 4, lambda i, a: 0.5 * a + jnp.sin(a), x) + jax.lax.scan(
-        lambda a, b: (a * y + b, a), x, jnp.array([1.0, -0.5, 0.2]))[0],
+        (jnp.array([[1.0, 2.0], [0.5, -1.0]]) @ jnp.stack((x, y)))
+        @ jnp.tile(jnp.stack((x, y * y)), 2)[jnp.array([1, 2])]
+    ),
+    "moved": lambda x, y: (
+        jnp.zeros(4).at[jnp.array([2, 0])].set(jnp.stack((x, y)))
+        @ jnp.pad(jnp.stack((x * y, y)), (1, 1), constant_values=2.0)
+    ),
+    "loop": lambda x, y: (
+        jax.lax.fori_loop(0, 4, lambda i, a: 0.5 * a + jnp.sin(a), x)
+        + jax.lax.scan(lambda a, b: (a * y + b, a), x, jnp.array([1.0, -0.5, 0.2]))[0]
+    ),
 }  # fmt: skip
 
 
