@@ -167,7 +167,9 @@ def segments(actuators: int, nodes: int = 4, bins: int = 3, per: int = 4):
     return data.measured[:, 0], np.einsum("kj,sjc->skc", hats, acceleration), driven, hats
 
 
-@pytest.mark.parametrize("name", ["esso-osaka", "two rudders, all causes"])
+@pytest.mark.parametrize(
+    "name", ["esso-osaka", pytest.param("two rudders, all causes", marks=pytest.mark.long)]
+)
 def test_columns_of_segments_are_jaxs(name):
     """By start, nodes and θ, in double precision, also by what numbers move of the inputs."""
     model, theta, actuators = MODELS[name]()
