@@ -15,7 +15,7 @@ from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
 from shiplog.diagnosis.linear import linear_segments, segment_nodes, segments
 from shiplog.diagnosis.linear.linear_segments import Linear, Path
 from shiplog.diagnosis.linear.parameter_layout import Columns
-from shiplog.diagnosis.noise import discrepancy, likelihood
+from shiplog.diagnosis.noise import discrepancy, part_products
 from shiplog.diagnosis.noise.discrepancy import Discrepancy
 from shiplog.diagnosis.noise.likelihood import ProcessNoise
 from shiplog.diagnosis.nominal import nominal_reference
@@ -155,17 +155,13 @@ def campaign(
     unseen = discrepancy.build(
         PROFILE, PROCESS_NOISE.acceleration, count, discrepancy.OMITTED, nodes
     )
-    modes = likelihood.modes(likelihood.weighed(given, PROCESS_NOISE), PROCESS_NOISE)
-    if of_own.families:
-        modes = modes.joined(of_own.accelerations(given.cut, g))
-    whole = modes.joined(unseen.accelerations(given.cut, g))
-    by = np.concatenate(([1.0], columns.unit, np.ones(unseen.count)))
+    accelerations = np.concatenate([of.accelerations(given.cut, g) for of in (of_own, unseen)], -1)
     rows = np.array_split(np.arange(len(given.cut)), parts)
-    each = []
-    for part in rows:
-        weight = np.zeros(len(given.cut))
-        weight[part] = 1.0
-        each.append(whole.total(weight) * np.outer(by, by))
+    passes = part_products.passes(
+        given, PROCESS_NOISE, rows, np.append(columns.unit, np.ones(unseen.count)),
+        accelerations=accelerations,
+    )  # fmt: skip
+    each = [one.gram(PROCESS_NOISE.inverse_kernels(g.nodes)).G for one in passes]
     spread = np.full(count, deviation)
     sizes = columns.prior_information**-0.5
     sizes[first:] = size
@@ -194,11 +190,10 @@ class Straight(Trial):
 
     def linearise(self, numbers, near=None, noise_factor=None, remainder=None) -> Point:
         assert self.given is not None
-        columns, ref = self.reference.columns, self.reference
+        columns = self.reference.columns
         d = np.concatenate((np.zeros(columns.base), columns.numbers(dict(numbers))))
         linear = replace(self.given, e=self.given.e - self.given.j @ d)
-        weighed = likelihood.weighed(linear, ref.process_noise)
-        return self._refuse_divergent(Point(dict(numbers), linear.path, linear, weighed))
+        return self._refuse_divergent(Point(dict(numbers), linear.path, linear))
 
 
 def trial(made: Campaign, record: Record, given: Linear, fixed: tuple[str, ...] = ()) -> Straight:

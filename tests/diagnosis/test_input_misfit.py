@@ -8,7 +8,7 @@ import pytest
 from shiplog.diagnosis.linear.linear_segments import Linear, Path
 from shiplog.diagnosis.linear.segment_nodes import conditions_at_nodes
 from shiplog.diagnosis.linear.segments import Cut, SegmentGrid
-from shiplog.diagnosis.noise import input_misfit, likelihood
+from shiplog.diagnosis.noise import input_misfit, part_products
 from shiplog.diagnosis.noise.campaign_parts import marginal
 from shiplog.diagnosis.noise.likelihood import ProcessNoise
 from shiplog.models.compiled_network import Network
@@ -61,10 +61,11 @@ def bent(cut: Cut, hidden: np.ndarray, looks_like: np.ndarray, seed: int = 1) ->
 
 def nats(linear: Linear, own: input_misfit.Misfit | None) -> float:
     """Of the column, above nothing; of nominal process noise."""
-    modes = likelihood.modes(likelihood.weighed(linear, PROCESS_NOISE), PROCESS_NOISE)
-    if own is not None:
-        modes = modes.joined(own.accelerations(linear.cut, GRID))
-    total = modes.total(np.ones(len(linear.cut)))
+    own_count = 0 if own is None else own.count
+    total = part_products.whole(
+        linear, PROCESS_NOISE, np.ones(1 + own_count),
+        accelerations=None if own is None else own.accelerations(linear.cut, GRID),
+    ).G  # fmt: skip
     known = np.eye(len(total) - 1)
     without = np.delete(np.delete(total, 1, 0), 1, 1)
     return marginal(total, known, np.zeros(len(known))) - marginal(
@@ -73,11 +74,8 @@ def nats(linear: Linear, own: input_misfit.Misfit | None) -> float:
 
 
 def learned(linear: Linear) -> input_misfit.Misfit:
-    modes = likelihood.modes(likelihood.weighed(linear, PROCESS_NOISE), PROCESS_NOISE)
     one = np.ones(1)
-    return input_misfit.estimate(
-        network(), linear.cut, GRID, modes, one, one, PROCESS_NOISE.acceleration
-    )
+    return input_misfit.estimate(network(), linear, GRID, PROCESS_NOISE, one, one)
 
 
 def test_what_it_bends_the_network_by_is_its_acceleration():

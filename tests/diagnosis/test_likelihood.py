@@ -8,7 +8,7 @@ from scipy.stats import multivariate_normal
 
 from shiplog.diagnosis.linear.linear_segments import Linear, Path
 from shiplog.diagnosis.linear.segments import Cut
-from shiplog.diagnosis.noise import likelihood, noise_estimate
+from shiplog.diagnosis.noise import likelihood, noise_estimate, part_products
 from shiplog.diagnosis.noise.likelihood import ProcessNoise
 from shiplog.diagnosis.nominal.nominal_reference import inflation, marginal, nominal_information
 from shiplog.voyages.rows.timescale import NODE_STEP
@@ -63,8 +63,24 @@ def observed(process_noise: ProcessNoise, bins: int) -> np.ndarray:
     return whole
 
 
-def _gram(weighed: likelihood.Weighed, process_noise: ProcessNoise) -> likelihood.Gram:
-    return likelihood.modes(weighed, process_noise).gram()
+def _gram(
+    given: Linear, process_noise: ProcessNoise, known: ProcessNoise | None = None,
+    weight=None, accelerations=None, unit=None,
+) -> tuple[np.ndarray, float]:  # fmt: skip
+    """G_s of every segment, a part each, and the volume of all; `known` are instruments and
+    start, where they are not those of the process noise."""
+    count = 0 if accelerations is None else accelerations.shape[-1]
+    unit = np.ones(given.j.shape[-1] + count) if unit is None else unit
+    passes = list(
+        part_products.passes(
+            given, known or process_noise, np.arange(len(given.e))[:, None], unit, weight,
+            accelerations,
+        )
+    )  # fmt: skip
+    prior = process_noise.inverse_kernels((given.z.shape[-1] - 6) // 3)
+    each = [one.gram(prior) for one in passes]
+    volume = sum(one.volume for one in each) + sum(one.logdet for one in passes)
+    return np.stack([one.G for one in each]), volume
 
 
 def dense(given: Linear, process_noise: ProcessNoise, fitted: bool = False):
@@ -107,10 +123,10 @@ def test_gram_is_the_dense_gaussian(process_noise):
     """[e | J]ᵀ C⁻¹ [e | J] with start and acceleration in C. The start is fitted: log |C| is the
     restricted one, log |V| + log |Z₀ᵀ V⁻¹ Z₀| - log |Z₀ᵀ R⁻¹ Z₀|; V is of both noises."""
     given = linear(3)
-    found = _gram(likelihood.weighed(given, process_noise), process_noise)
+    found, volume = _gram(given, process_noise)
     for s, (e, j, c) in enumerate(dense(given, process_noise)):
         block = np.concatenate((e[:, None], j), 1)
-        assert found.each[s] == pytest.approx(block.T @ np.linalg.solve(c, block), rel=1e-6)
+        assert found[s] == pytest.approx(block.T @ np.linalg.solve(c, block), rel=1e-6)
     logdet = 0.0
     for s, (_, _, v) in enumerate(dense(given, process_noise, fitted=True)):
         used = given.cut.used[s].ravel()
@@ -119,7 +135,7 @@ def test_gram_is_the_dense_gaussian(process_noise):
         felt = start.T @ np.linalg.solve(v, start) + np.diag(process_noise.start**-2.0)
         logdet += np.linalg.slogdet(v)[1] + np.linalg.slogdet(felt)[1]
         logdet -= np.linalg.slogdet(start.T @ np.linalg.solve(r, start))[1]
-    assert found.logdet == pytest.approx(logdet, rel=1e-5)
+    assert volume == pytest.approx(logdet, rel=1e-5)
 
 
 @EACH
@@ -134,9 +150,9 @@ def test_a_square_of_errors_alone_is_that_of_their_gram(process_noise):
         replace(process_noise, intermittent=np.array([0.1, 2.0, 0.7])),
     ):
         each, volume = likelihood.startless(weighed, process_noise).square(other)
-        wanted = _gram(weighed, other)
-        assert each == pytest.approx(wanted.each[:, 0, 0], rel=1e-9)
-        assert volume == pytest.approx(wanted.logdet, rel=1e-9)
+        wanted, whole = _gram(alone, other, process_noise)
+        assert each == pytest.approx(wanted[:, 0, 0], rel=1e-9)
+        assert volume == pytest.approx(whole, rel=1e-9)
 
 
 def test_evidence_of_a_size_of_process_noise_is_that_of_the_dense_gaussian():
@@ -146,8 +162,8 @@ def test_evidence_of_a_size_of_process_noise_is_that_of_the_dense_gaussian():
     towards = np.concatenate(([1.0], -d))
     found, wanted = [], []
     for process_noise in (sure, sure.times(3.0)):
-        gram = _gram(likelihood.weighed(given, PROCESS_NOISE), process_noise)
-        found.append(-0.5 * (towards @ gram.each.sum(0) @ towards + gram.logdet))
+        each, volume = _gram(given, process_noise)
+        found.append(-0.5 * (towards @ each.sum(0) @ towards + volume))
         every = dense(given, process_noise)
         wanted.append(sum(multivariate_normal(mean=j @ d, cov=c).logpdf(e) for e, j, c in every))
     assert abs(wanted[1] - wanted[0]) > 10.0
@@ -156,41 +172,34 @@ def test_evidence_of_a_size_of_process_noise_is_that_of_the_dense_gaussian():
 
 def test_units_scale_columns_and_not_the_error():
     given = linear(2)
-    found = _gram(likelihood.weighed(given, PROCESS_NOISE), PROCESS_NOISE)
     unit = np.array([1e-3, 40.0])
-    bent = replace(given, j=given.j * unit)
-    direct = _gram(likelihood.weighed(bent, PROCESS_NOISE), PROCESS_NOISE)
-    assert found.scaled(unit).each == pytest.approx(direct.each, rel=1e-9)
-    assert found.scaled(unit).logdet == found.logdet
+    found, volume = _gram(given, PROCESS_NOISE, unit=unit)
+    direct, same = _gram(replace(given, j=given.j * unit), PROCESS_NOISE)
+    assert found == pytest.approx(direct, rel=1e-9)
+    assert volume == same
 
 
-def test_further_columns_bend_the_observations_as_their_acceleration_does():
-    given = linear(3)
+@pytest.mark.parametrize("noise_factor", (0.5, 1.0, 2.0))
+def test_further_columns_bend_the_observations_as_their_acceleration_does(noise_factor):
+    """Given as they are, or as a function that makes those of some segments; units are theirs."""
+    given, unit = linear(3), np.array([1.0, 2.0, 1.0, 0.5, 1.0, 3.0])
     accelerations = np.random.default_rng(9).standard_normal((3, 9, 4))
-    found = (
-        likelihood.modes(likelihood.weighed(given, PROCESS_NOISE), PROCESS_NOISE)
-        .joined(accelerations)
-        .gram()
-    )
     columns = np.einsum("sbcz,szw->sbcw", given.z[..., 6:], accelerations)
-    written_out = replace(given, j=np.concatenate((given.j, columns), -1))
-    direct = _gram(likelihood.weighed(written_out, PROCESS_NOISE), PROCESS_NOISE)
-    assert found.each == pytest.approx(direct.each, rel=1e-6, abs=1e-6)
-    modes, weight = (
-        likelihood.modes(likelihood.weighed(given, PROCESS_NOISE), PROCESS_NOISE),
-        np.array([1, 0, 0.4]),
+    written_out = replace(given, j=np.concatenate((given.j, columns), -1) * unit)
+    process_noise = PROCESS_NOISE.times(noise_factor)
+    wanted, volume = _gram(written_out, process_noise)
+    found, same = _gram(given, process_noise, accelerations=accelerations, unit=unit)
+    assert found == pytest.approx(wanted, rel=1e-6, abs=1e-6)
+    assert same == pytest.approx(volume, rel=1e-9)
+    weight = np.array([1.0, 0.0, 0.4])
+    total = part_products.whole(
+        given, process_noise, unit, weight, lambda cut: accelerations[cut.rows]
     )
-    for noise_factor in (0.5, 2.0):
-        each = _gram(
-            likelihood.weighed(written_out, PROCESS_NOISE), PROCESS_NOISE.times(noise_factor)
-        ).each
-        whole = (
-            modes.joined(accelerations[..., :1])
-            .joined(accelerations[..., 1:])
-            .total(weight, noise_factor)
-        )
-        wanted = np.einsum("s,sij->ij", weight, each)
-        assert whole == pytest.approx(wanted, rel=1e-6, abs=1e-6)
+    assert pytest.approx(np.einsum("s,sij->ij", weight, wanted), rel=1e-6, abs=1e-6) == total.G
+    first = next(part_products.passes(given, PROCESS_NOISE, [np.arange(3)], unit,
+                                      accelerations=accelerations))  # fmt: skip
+    fewer = first.gram(process_noise.inverse_kernels(3), 4)
+    assert pytest.approx(wanted.sum(0)[:4, :4], rel=1e-6, abs=1e-6) == fewer.G
 
 
 def test_less_an_acceleration_is_less_what_it_does():
@@ -200,27 +209,31 @@ def test_less_an_acceleration_is_less_what_it_does():
     assert moved.less(accelerations).e == pytest.approx(given.e, abs=1e-12)
 
 
-def test_the_total_is_the_weighted_sum():
-    given, weight = linear(3), np.array([1.0, 0.0, 0.4])
-    weighed = likelihood.weighed(given, PROCESS_NOISE)
-    each = _gram(weighed, PROCESS_NOISE.times(2.0)).each
-    whole = likelihood.modes(weighed, PROCESS_NOISE.times(2.0)).total(weight)
-    assert whole == pytest.approx(np.einsum("s,sij->ij", weight, each), rel=1e-9)
-
-
-def test_one_pass_serves_every_size_of_process_noise():
-    given = linear(3)
-    weighed, weight = likelihood.weighed(given, PROCESS_NOISE), np.array([1.0, 0.0, 0.4])
-    modes = likelihood.modes(weighed, PROCESS_NOISE)
+@EACH
+def test_one_pass_serves_every_process_noise(process_noise):
+    """Sizes of it, and shapes: of a pass that was made with the nominal one, weighted sums."""
+    given, weight = linear(4), np.array([1.0, 0.0, 0.4, 1.0])
+    if process_noise.runs is not None:  # the fourth as the first: one kernel serves both
+        runs = np.concatenate((process_noise.runs, process_noise.runs[:1]))
+        process_noise = replace(process_noise, runs=runs)
+    made = replace(process_noise, intermittent=None)
+    (part,) = part_products.passes(given, made, [np.arange(4)], np.ones(2), weight)
     for noise_factor in (0.5, 2.0, 5.0):
-        found, wanted = (
-            modes.gram(noise_factor),
-            _gram(weighed, PROCESS_NOISE.times(noise_factor)),
-        )
-        assert found.each == pytest.approx(wanted.each, rel=1e-6)
-        assert found.logdet == pytest.approx(wanted.logdet, rel=1e-9)
-        whole = np.einsum("s,sij->ij", weight, wanted.each)
-        assert modes.total(weight, noise_factor) == pytest.approx(whole, rel=1e-6)
+        other = process_noise.times(noise_factor)
+        each, _ = _gram(given, other)
+        found = part.gram(other.inverse_kernels(3))
+        assert pytest.approx(np.einsum("s,sij->ij", weight, each), rel=1e-6) == found.G
+        volumes = [_gram(given.pick(np.arange(4) == s), _one(other, s))[1] for s in range(4)]
+        alone = [_gram(given.pick(np.arange(4) == s), made)[1] for s in range(4)]
+        base = part.gram(made.inverse_kernels(3)).volume
+        wanted = base + float(weight @ (np.array(volumes) - np.array(alone)))
+        assert found.volume == pytest.approx(wanted, rel=1e-9)
+
+
+def _one(process_noise: ProcessNoise, segment: int) -> ProcessNoise:
+    if process_noise.runs is None:
+        return process_noise
+    return replace(process_noise, runs=process_noise.runs[segment : segment + 1])
 
 
 @EACH
@@ -238,9 +251,7 @@ def test_start_and_accelerations_are_the_posterior_mean(process_noise):
 def test_marginal_is_the_dense_gaussian():
     """Numbers d ~ N(m, Λ⁻¹) integrated out, up to what no prior changes: priors compared."""
     given = linear(3)
-    total = likelihood.modes(likelihood.weighed(given, PROCESS_NOISE), PROCESS_NOISE).total(
-        np.ones(len(given.e))
-    )
+    total = part_products.whole(given, PROCESS_NOISE, np.ones(2)).G
     found, wanted = [], []
     for mean, sure in (((0.0, 0.0), (1.0, 4.0)), ((0.5, -1.0), (0.1, 30.0))):
         information = np.diag(sure)

@@ -10,7 +10,7 @@ from straight import CAUSES, PROCESS_NOISE, SETTING
 
 from shiplog.diagnosis.linear import segments
 from shiplog.diagnosis.linear.parameter_layout import Columns
-from shiplog.diagnosis.noise import campaign_parts, discrepancy, likelihood
+from shiplog.diagnosis.noise import campaign_parts, discrepancy, part_products
 from shiplog.diagnosis.noise.campaign_parts import FEWEST_PARTS, parts_of
 from shiplog.diagnosis.noise.discrepancy import Discrepancy
 from shiplog.diagnosis.nominal import (
@@ -69,19 +69,19 @@ def test_products_of_parts_are_those_of_the_whole():
     columns = straight.columns_of(CAUSES[:2])
     record = straight.sailed(6)
     given = straight.passed(record, columns)
-    modes = likelihood.modes(likelihood.weighed(given, PROCESS_NOISE), PROCESS_NOISE)
     weight = np.linspace(0.2, 1.0, 6)
     unit = columns.unit
     rows = [np.arange(2), np.arange(2, 6)]
-    found = campaign_parts.products(modes, rows, unit, weight, 1.3)
+    prior = PROCESS_NOISE.times(1.3).inverse_kernels(segments.grid(record).nodes)
+    passes = part_products.passes(given, PROCESS_NOISE, rows, unit, weight)
+    found = [one.gram(prior).G for one in passes]
     wanted = np.zeros((1 + len(unit),) * 2)
     for s, (e, j, _, c) in enumerate(straight.dense(given, PROCESS_NOISE.times(1.3))):
         both = np.concatenate((e[:, None], j * unit), 1)
         wanted += weight[s] * both.T @ np.linalg.solve(c, both)
     assert sum(found) == pytest.approx(wanted, rel=1e-6)
-    assert campaign_parts.products(modes, rows, unit)[0] == pytest.approx(
-        campaign_parts.products(modes, rows, unit, np.ones(6), 1.0)[0]
-    )
+    every = part_products.whole(given, PROCESS_NOISE.times(1.3), unit, weight)
+    assert np.allclose(every.G, wanted, rtol=1e-6)
 
 
 def test_weights_of_segments_by_hand():
@@ -249,11 +249,11 @@ def test_what_is_left_of_a_campaign_has_nothing_that_its_parts_differ_by(learned
     accelerations = ref.misfit.accelerations(ref.nominal.cut, segments.grid(record))
 
     def pulls(left):
-        modes = likelihood.modes(likelihood.weighed(left, ref.process_noise), ref.process_noise)
-        each = campaign_parts.products(
-            modes.joined(accelerations), made.rows, ref.columns.unit, made.weight
+        prior = ref.process_noise.inverse_kernels(segments.grid(record).nodes)
+        each = part_products.passes(
+            left, ref.process_noise, made.rows, ref.columns.unit, made.weight, accelerations
         )
-        return np.stack([one[1:, 0] for one in each])
+        return np.stack([one.gram(prior).G[1:, 0] for one in each])
 
     free = replace(made, effects=replace(made.effects, deviation=np.full(count, 1e4)))
     before = np.abs(pulls(ref.nominal)).max(0)

@@ -157,13 +157,13 @@ def test_products_of_a_point_that_is_gone_are_not_taken_for_anothers(trial):
     products = straight.trial(trial.campaign, trial.record, trial.given).products
 
     def total(point):
-        return products.total(point, 1.0, trial.weight, Remainder())[0]
+        return products.total(point, 1.0, trial.weight, Remainder()).G
 
     assert total(first) is total(first)  # worked out once
     apart, wanted = total(here)[0, 0], total(there)
     assert abs(apart / wanted[0, 0] - 1.0) > 1e-3
     total(last)  # of points passes are kept, too: the first one's and two more
-    stood, again = id(here.weighed), there.weighed
+    stood, again = id(here.linear), there.linear
     del here
     gc.collect()
     others = []
@@ -171,7 +171,7 @@ def test_products_of_a_point_that_is_gone_are_not_taken_for_anothers(trial):
         others.append(replace(again))
         if id(others[-1]) == stood:
             break
-    assert total(replace(there, weighed=others[-1])) == pytest.approx(wanted)
+    assert total(replace(there, linear=others[-1])) == pytest.approx(wanted)
 
 
 def test_segments_on_which_the_model_runs_away_carry_no_weight(made):
@@ -233,11 +233,11 @@ def test_products_without_a_voyage_are_those_of_segments_of_no_weight(trial, kin
     found = products.leave_out(point, 1.5, trial.weight, remainder, left_out)
     weight = np.where(left_out, 0.0, trial.weight)
     fresh = straight.trial(trial.campaign, trial.record, trial.given).products
-    wanted, _ = fresh.total(point, 1.5, weight, remainder)
+    wanted = fresh.total(point, 1.5, weight, remainder).G
     assert found == pytest.approx(wanted, rel=1e-9, abs=1e-9 * np.abs(wanted).max())
     if len(out) < 8:
         assert (
-            np.abs(found[0, 0] / products.total(point, 1.5, trial.weight, remainder)[0][0, 0] - 1)
+            np.abs(found[0, 0] / products.total(point, 1.5, trial.weight, remainder).G[0, 0] - 1)
             > 0.01
         )
 

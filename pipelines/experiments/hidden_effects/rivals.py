@@ -31,7 +31,7 @@ from shiplog.diagnosis.linear import measurement_correction, segments
 from shiplog.diagnosis.linear.linear_segments import Linear
 from shiplog.diagnosis.linear.parameter_layout import Columns
 from shiplog.diagnosis.linear.segments import Cut
-from shiplog.diagnosis.noise import likelihood
+from shiplog.diagnosis.noise import likelihood, part_products
 from shiplog.diagnosis.noise.likelihood import ProcessNoise
 from shiplog.diagnosis.thresholds import SHOWS_NATS
 from shiplog.diagnosis.trial.fitted import Point
@@ -239,12 +239,7 @@ def white_total(
     linear: Linear, noise: np.ndarray, start: np.ndarray, unit: np.ndarray
 ) -> np.ndarray:
     """[1 + C, 1 + C] products of [e | J] in units, the starts eliminated, no nodes."""
-    by = np.concatenate(([1.0], unit))
-    quiet = _quiet(noise, start)
-    total = likelihood.modes(likelihood.weighed(_white(linear), quiet), quiet).total(
-        np.ones(len(linear.e))
-    )
-    return total * np.outer(by, by)
+    return part_products.whole(_white(linear), _quiet(noise, start), unit).G
 
 
 def _white(linear: Linear) -> Linear:

@@ -52,11 +52,13 @@ def robust(trial: Trial, point: Point) -> np.ndarray:
     """Weights [S] of the segments by their χ² at the posterior mean, A⁻¹ b (7). They are the same
     for every hypothesis: a few segments must not decide."""
     best = max(levels(trial, point), key=lambda one: one.value)
-    none = np.zeros(trial.omitted.count)
-    unit = np.append(trial.reference.columns.unit, none)
-    d = np.append(best.mean[: len(trial.reference.pull)], none)
-    modes, noise = trial.products.modes(point, best.noise_factor, NO_CHANGE_OF_NOISE)
-    return robust_weights(squares(modes, d * unit, noise), trial.weight > 0.0)
+    ref = trial.reference
+    d = best.mean[: len(ref.pull)] * ref.columns.unit
+    left, d = trial.less_misfit(point.linear, d)
+    left = replace(left, e=left.e - left.j @ d)
+    nominal = ref.process_noise
+    square = squares(left, nominal, nominal.times(best.noise_factor))
+    return robust_weights(square, trial.weight > 0.0)
 
 
 # --- one factor of the process noise
@@ -70,7 +72,7 @@ def level(
 
     Its value is log Z (3) + log p(λ) + the share of the bounds (13)."""
     assert trial.first is not None
-    G, _ = trial.products.total(point, noise, trial.weight, remainder)
+    G = trial.products.total(point, noise, trial.weight, remainder).G
     log_R = trial.products.volume(trial.first, noise, trial.weight, remainder)
     one = solve(trial, G, log_R, noise, point, included, remainder)
     log_Z = one.value + noise_prior(noise, trial.nominal_spread, remainder)
@@ -211,9 +213,8 @@ def family_change(
     ref, c = trial.reference, trial.reference.counts
     W = 1 + trial.families[family]
     H = 1 + np.concatenate([np.arange(len(ref.pull)), *(ref.columns.indices[n] for n in included)])
-    G, _ = trial.products.total(
-        point, one.noise_factor, trial.weight, replace(remainder, kind=family)
-    )
+    with_family = replace(remainder, kind=family)
+    G = trial.products.total(point, one.noise_factor, trial.weight, with_family).G
     B = c * G[np.ix_(H, W)]
     y = c * G[W, 0] - B.T @ one.mean
     M = c * G[np.ix_(W, W)] - B.T @ one.covariance @ B

@@ -92,8 +92,8 @@ def less_parts(trial: Trial, linear: Linear, fit: Fit) -> Linear:
     each = trial.products.each_part(
         fit.point, fit.estimate.noise_factor, trial.weight, fit.remainder
     )  # fmt: skip
-    for k, G in enumerate(each):
-        b[part == k] = voyage_effects.own_numbers(G, theta, deviation) * columns.unit
+    for k, one in enumerate(each):
+        b[part == k] = voyage_effects.own_numbers(one.G, theta, deviation) * columns.unit
     return linear.less_numbers(b, accelerations)
 
 
@@ -113,10 +113,10 @@ def imitated(trial: Trial, fit: Fit, label: str, size: float) -> float:
         return 0.0
     ref = trial.reference
     of, nominal = ref.columns.indices[label], np.arange(len(ref.pull))
-    G, _ = trial.products.total(
+    total = trial.products.total(
         fit.point, fit.estimate.noise_factor, trial.weight, fit.remainder
     )  # fmt: skip
-    G = ref.counts * G[1:, 1:]
+    G = ref.counts * total.G[1:, 1:]
     both = np.concatenate((of, family)).astype(int)
     B = G[np.ix_(nominal, both)]
     A = G[: len(nominal), : len(nominal)] + ref.information

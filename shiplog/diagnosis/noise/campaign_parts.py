@@ -1,13 +1,15 @@
-"""Parts of a campaign, the products G = Σ_s w_s G_s of their segments, and their evidence."""
+"""Parts of a campaign, weights of their segments, and the evidence of their products
+(`part_products`)."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from shiplog.diagnosis.noise.likelihood import Modes
+from shiplog.diagnosis.linear.linear_segments import Linear
+from shiplog.diagnosis.noise import likelihood
+from shiplog.diagnosis.noise.likelihood import ProcessNoise
 
 ROBUST = 6.0  # medians of χ², from which on a segment counts less
 PART = 20  # segments of one part of a campaign: 10 minutes of a three-metre ship
@@ -29,30 +31,6 @@ def parts_of(voyage: np.ndarray, part: int = PART, fewest: int = FEWEST_PARTS) -
         part = part // 2
 
 
-def picked(modes: Modes, rows: np.ndarray) -> Modes:
-    """The segments `rows` of a pass; its volume is not theirs."""
-    return replace(
-        modes, dd=modes.dd[rows], md=modes.md[rows], felt=modes.felt[rows], axes=modes.axes[rows],
-        accelerations=modes.accelerations[rows],
-    )  # fmt: skip
-
-
-def products(
-    modes: Modes, parts: Sequence[np.ndarray], unit: np.ndarray,
-    weight: np.ndarray | None = None, noise: float = 1.0,
-) -> list[np.ndarray]:  # fmt: skip
-    """G = diag(1, u) Σ_s w_s G_s(λ) diag(1, u) [1 + C, 1 + C] of each part, its segments s.
-
-    unit     u [C]
-    weight   w [S] of each segment; one unless given
-    noise    λ, factor of the process noise
-    """
-    by = np.concatenate(([1.0], unit))
-    scale = np.outer(by, by)
-    weight = np.ones(len(modes.dd)) if weight is None else weight
-    return [picked(modes, rows).total(weight[rows], noise) * scale for rows in parts]
-
-
 def robust_weights(square: np.ndarray, kept: np.ndarray) -> np.ndarray:
     """w_s = min(1, ROBUST · median(χ²)/χ²_s) [S] of segments with these squares χ² [S]: a few
     segments do not decide. Segments that are not `kept` [S] have none."""
@@ -61,21 +39,16 @@ def robust_weights(square: np.ndarray, kept: np.ndarray) -> np.ndarray:
     return np.where(kept, weight, 0.0)
 
 
-def squares(modes: Modes, numbers: np.ndarray, noise: float = 1.0) -> np.ndarray:
-    """χ²_s = (e - J x)ᵀ C_s⁻¹ (e - J x) [S] of numbers x = (d, w) [C + W], SI: of the pass's own
-    columns, then of those of accelerations at the nodes. With v = (1, -d) and ψ = -Ψ w,
+def squares(
+    linear: Linear, nominal: ProcessNoise, process_noise: ProcessNoise | None = None
+) -> np.ndarray:
+    """χ²_s = eᵀ C_s⁻¹ e [S], of what is left of a pass: `Linear.less_numbers` for some.
 
-        χ² = vᵀ Eᵀ E v + Σ ψ (2 M v + f ψ) - Σ (M v + f ψ)² / (f + λ⁻²)
-
-    noise   λ
+    nominal        instruments and start; process_noise, where it is not the same
     """
-    x = np.concatenate(([1.0], -numbers))
-    v, minus_w = x[: modes.dd.shape[-1]], x[modes.dd.shape[-1] :]
-    psi = modes.accelerations @ minus_w
-    Mv = modes.md @ v
-    square = np.einsum("i,sij,j->s", v, modes.dd, v, optimize=True)
-    square += ((2.0 * Mv + modes.felt * psi) * psi).sum(-1)
-    return square - ((Mv + modes.felt * psi) ** 2 / (modes.felt + noise**-2.0)).sum(-1)
+    alone = replace(linear, j=linear.j[..., :0])
+    passed = likelihood.startless(likelihood.weighed(alone, nominal), nominal)
+    return passed.square(process_noise or nominal)[0]
 
 
 def marginal(gram: np.ndarray, information: np.ndarray, pull: np.ndarray) -> float:

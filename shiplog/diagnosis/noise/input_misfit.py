@@ -15,9 +15,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from shiplog.diagnosis.linear import segment_nodes
+from shiplog.diagnosis.linear.linear_segments import Linear
 from shiplog.diagnosis.linear.segment_nodes import Nodes
 from shiplog.diagnosis.linear.segments import Cut, SegmentGrid
-from shiplog.diagnosis.noise.likelihood import Modes
+from shiplog.diagnosis.noise import part_products
+from shiplog.diagnosis.noise.likelihood import ProcessNoise
 from shiplog.machine.jit_cache import double
 from shiplog.models.compiled_network import Network
 
@@ -52,8 +54,8 @@ class Misfit:
 
 
 def estimate(
-    network: Network, cut: Cut, g: SegmentGrid, modes: Modes, known: np.ndarray,
-    unit: np.ndarray, acceleration: np.ndarray,
+    network: Network, linear: Linear, g: SegmentGrid, process_noise: ProcessNoise,
+    known: np.ndarray, unit: np.ndarray,
 ) -> Misfit:  # fmt: skip
     """The misfit with the most probable size s, the numbers d [C] integrated out (`_likelihood`).
 
@@ -61,20 +63,21 @@ def estimate(
     eigenvalues; U [3 SUMS, W], of rows U_c, the eigenvectors of s² M_ww, the information of these
     voyages on the weights, with eigenvalues above FELT.
 
-    cut    of the voyages that `modes` are of
+    linear  of these voyages
+    process_noise  theirs; its accelerations q [3] are the unit of size
     known  K [C], prior information of d, in `unit`s [C]
-    acceleration  q [3], unit of size
     """
-    waves = _features(network, segment_nodes.conditions_at_nodes(cut, g))
+    waves = _features(network, segment_nodes.conditions_at_nodes(linear.cut, g))
     sums = np.linalg.eigh(np.tensordot(waves, waves, ((0, 1), (0, 1))))[1][:, -SUMS:]
     count = sums.shape[1]
     axes = np.zeros((3, len(sums), 3 * count))
-    for channel, size in enumerate(acceleration):
+    for channel, size in enumerate(process_noise.acceleration):
         axes[channel][:, channel * count : (channel + 1) * count] = size * sums
     whole = Misfit(network, axes)
-    by = np.concatenate(([1.0], unit, np.ones(3 * count)))
-    total = modes.joined(whole.accelerations(cut, g)).total(np.ones(len(cut)))
-    total = total * np.outer(by, by)
+    total = part_products.whole(
+        linear, process_noise, np.append(unit, np.ones(3 * count)),
+        accelerations=lambda cut: whole.accelerations(cut, g),
+    ).G  # fmt: skip
     size = max(INPUT_SIZES, key=lambda one: _likelihood(total, known, one))
     information = total[1 + len(known) :, 1 + len(known) :]
     felt, turned = np.linalg.eigh(size**2 * information)

@@ -4,7 +4,8 @@
 
 The start is free. The acceleration is process noise: an Ornstein-Uhlenbeck process whose standard
 deviation is estimated from the nominal campaign (Kennedy & O'Hagan 2001). Both are eliminated
-segment by segment, which leaves one small matrix over [e | J]:
+segment by segment, the start here; the acceleration leaves one small matrix over [e | J]
+(`part_products`):
 
     G_s = [e | J]ᵀ C_s⁻¹ [e | J],   C_s = R + Z_s P Z_sᵀ
 
@@ -72,6 +73,19 @@ class ProcessNoise:
         each = np.einsum("ab,sij->saibj", ppT, self.runs * T)
         return Q + each.reshape(len(each), *Q.shape)
 
+    def inverse_kernels(self, nodes: int) -> InverseKernels:
+        """Q⁻¹ and log|Q|, once for all segments in which a force is on and off alike. Raises
+        np.linalg.LinAlgError where Q is not positive definite."""
+        alike, which = self, None
+        if self.intermittent is not None and self.runs is not None:
+            patterns = np.packbits(self.runs.reshape(len(self.runs), -1) != 0.0, axis=1)
+            _, first, which = np.unique(patterns, axis=0, return_index=True, return_inverse=True)
+            alike, which = replace(self, runs=self.runs[first]), which.reshape(-1)
+        Q = alike.kernel(nodes)
+        Q = Q if Q.ndim == 3 else Q[None]
+        logdet = 2.0 * np.log(np.diagonal(np.linalg.cholesky(Q), axis1=1, axis2=2)).sum(1)
+        return InverseKernels(np.linalg.inv(Q), logdet, which)
+
     def times(self, factor: float) -> ProcessNoise:
         """λ² Q: the same with standard deviations λ q."""
         return replace(self, acceleration=self.acceleration * factor)
@@ -84,6 +98,26 @@ class ProcessNoise:
         P_inverse[..., :6, :6] = np.diag(self.start**-2.0)
         P_inverse[..., 6:, 6:] = Q_inverse
         return P_inverse
+
+
+@dataclass(frozen=True)
+class InverseKernels:
+    """Q⁻¹ [U, 3J, 3J] of U different segments, log|Q| [U], and `which` [S] of them each segment
+    has; None where all have the first."""
+
+    inverse: np.ndarray
+    volume: np.ndarray
+    which: np.ndarray | None
+
+    def of(self, rows: np.ndarray) -> np.ndarray:
+        """Q⁻¹ of some segments [s, 3J, 3J], or of one for all [3J, 3J]."""
+        return self.inverse[0] if self.which is None else self.inverse[self.which[rows]]
+
+    def logdet(self, rows: np.ndarray) -> np.ndarray:
+        """log|Q| of some segments [s]."""
+        if self.which is None:
+            return np.full(len(rows), self.volume[0])
+        return self.volume[self.which[rows]]
 
 
 def decay(at: np.ndarray, time: float) -> np.ndarray:
@@ -160,92 +194,6 @@ def weighed(linear: Linear, process_noise: ProcessNoise) -> Weighed:
 
 
 @dataclass(frozen=True)
-class Gram:
-    """G_s = [e | J]ᵀ C_s⁻¹ [e | J] of every segment [S, 1 + C, 1 + C], and Σ log|C_s|, restricted
-    to what no start explains."""
-
-    each: np.ndarray
-    logdet: float
-
-    def scaled(self, unit: np.ndarray) -> Gram:
-        """diag(1, u) G_s diag(1, u) of numbers in units u [C]: matrices of numbers that differ by
-        1e6 do not invert."""
-        by = np.concatenate(([1.0], unit))
-        return Gram(self.each * np.outer(by, by), self.logdet)
-
-
-@dataclass(frozen=True)
-class Modes:
-    """A pass without its starts, in axes that diagonalise prior and data information of the
-    acceleration at the nodes. Any factor λ of the process noise is then a division.
-
-    dd      [S, 1 + C, 1 + C]  Eᵀ E, white and the start eliminated; E = [e | J]
-    md      [S, 3J, 1 + C]     M = Uᵀ Lᵀ Zₐᵀ E
-    felt    [S, 3J]            f, data information of each mode over its prior information
-    axes    [S, 3J, 3J]        Uᵀ L⁻¹, from accelerations at the nodes to modes
-    logdet  log|R| + log|F + P₀⁻¹| - log|F|, of noise and start
-    accelerations  [S, 3J, W]  Ψ = Uᵀ L⁻¹ Φ, modes of further columns that act as accelerations
-    """
-
-    dd: np.ndarray
-    md: np.ndarray
-    felt: np.ndarray
-    axes: np.ndarray
-    logdet: float
-    accelerations: np.ndarray
-
-    def joined(self, accelerations: np.ndarray) -> Modes:
-        """With W columns more, Ψ = Uᵀ L⁻¹ Φ of accelerations Φ [S, 3J, W] at the nodes."""
-        return replace(
-            self, accelerations=np.concatenate((self.accelerations, self.axes @ accelerations), -1)
-        )
-
-    def first(self, columns: int) -> Modes:
-        """With that many of its C + W columns, C at least."""
-        more = columns + 1 - self.dd.shape[-1]
-        return replace(self, accelerations=self.accelerations[..., :more])
-
-    def total(self, weight: np.ndarray, noise_factor: float = 1.0) -> np.ndarray:
-        """G = Σ_s w_s G_s(λ) [1 + C + W, 1 + C + W], without making each of `gram`'s matrices.
-
-            G_EE = Σ_s w_s (Eᵀ E - Mᵀ D M),   D = diag(1 / (f + λ⁻²))
-            G_ΨE = Σ_s w_s λ⁻² Ψᵀ D M,   G_ΨΨ = Σ_s w_s λ⁻² Ψᵀ D diag(f) Ψ
-
-        weight         w [S] of each segment
-        noise_factor   λ
-        """
-        root = np.sqrt(weight[:, None] / (self.felt + noise_factor**-2.0))[..., None]  # (w D)^½
-        M = (self.md * root).reshape(-1, self.md.shape[-1])
-        G = np.tensordot(weight, self.dd, 1) - M.T @ M
-        if not self.accelerations.shape[-1]:
-            return G
-        # the effect of such a column, less the part that process noise explains
-        Psi = (self.accelerations * root).reshape(-1, self.accelerations.shape[-1])
-        across = noise_factor**-2.0 * (Psi.T @ M)
-        Psi *= np.sqrt(self.felt).reshape(-1, 1) / noise_factor
-        return np.block([[G, across.T], [across, Psi.T @ Psi]])
-
-    def gram(self, noise_factor: float = 1.0) -> Gram:
-        """G_s(λ) = E'ᵀ E' - M'ᵀ diag(1 / (f + λ⁻²)) M' of every segment, with the further columns:
-        E'ᵀ E' = [[Eᵀ E, Mᵀ Ψ], [Ψᵀ M, Ψᵀ diag(f) Ψ]],  M' = [M | diag(f) Ψ]; and log|C|."""
-        f_Psi = self.felt[..., None] * self.accelerations
-        across = np.swapaxes(self.md, 1, 2) @ self.accelerations
-        EtE = np.block([
-            [self.dd, across],
-            [np.swapaxes(across, 1, 2), np.swapaxes(self.accelerations, 1, 2) @ f_Psi],
-        ])  # fmt: skip
-        M = np.concatenate((self.md, f_Psi), -1)
-        D_M = M / (self.felt + noise_factor**-2.0)[..., None]
-        return Gram(EtE - np.swapaxes(M, 1, 2) @ D_M, self.log_volume(noise_factor))
-
-    def log_volume(self, noise_factor: float = 1.0, weight: np.ndarray | None = None) -> float:
-        """Σ_s log|C_s| = `logdet` + Σ_s w_s Σ log(1 + λ² f_s): log|C| of all segments; the part
-        that the factor λ changes has each segment's weight w [S], one unless given."""
-        each = np.log1p(noise_factor**2 * self.felt).sum(-1)
-        return self.logdet + float(each.sum() if weight is None else weight @ each)
-
-
-@dataclass(frozen=True)
 class Startless:
     """A pass without its starts, whatever is known of the acceleration at the nodes: products in
     C₀⁻¹, C₀ = R + Z₀ P₀ Z₀ᵀ.
@@ -262,24 +210,35 @@ class Startless:
     logdet: float
 
     def square(self, process_noise: ProcessNoise) -> tuple[np.ndarray, float]:
-        """eᵀ C⁻¹ e of every segment [S], of a pass of e alone, and Σ log|C|.
+        """eᵀ C⁻¹ e of every segment [S], of a pass of e alone, and Σ log|C|, where
+        log|C| = log|C₀| + log|Q| + log|A|, A = Zₐᵀ C₀⁻¹ Zₐ + Q⁻¹. Raises np.linalg.LinAlgError
+        where a matrix is not positive definite."""
+        prior = process_noise.inverse_kernels(self.kk.shape[-1] // 3)
+        every = np.arange(len(self.kk))
+        each, logs = roots(self.kk, self.kd[..., 0], self.dd[:, 0, 0], prior)
+        return each, self.logdet + float((logs + prior.logdet(every)).sum())
 
-        With A = Zₐᵀ C₀⁻¹ Zₐ + Q⁻¹ and b = Zₐᵀ C₀⁻¹ e, the last diagonal element of the Cholesky
-        root of [[A, b], [bᵀ, eᵀ C₀⁻¹ e]] is (eᵀ C₀⁻¹ e - bᵀ A⁻¹ b)^½ = (eᵀ C⁻¹ e)^½; the others
-        give log|A|, and log|C| = log|C₀| + log|Q| + log|A|. Raises np.linalg.LinAlgError where the
-        matrix is not positive definite.
-        """
-        n = self.kk.shape[-1]  # 3J
-        Q = process_noise.kernel(n // 3)
-        bordered = np.empty((len(self.kk), n + 1, n + 1))
-        bordered[:, :n, :n] = self.kk + np.linalg.inv(Q)
-        bordered[:, :n, n:], bordered[:, n:, n:] = self.kd, self.dd
-        bordered[:, n, :n] = self.kd[..., 0]
-        root = np.diagonal(np.linalg.cholesky(bordered), axis1=1, axis2=2)
-        each = np.broadcast_to(np.linalg.slogdet(Q)[1], len(self.kk))
-        log_Q = float(each.sum())
-        volume = log_Q + 2.0 * float(np.log(root[:, :n]).sum())
-        return root[:, n] ** 2, self.logdet + volume
+
+def roots(
+    kk: np.ndarray, kd: np.ndarray, dd: np.ndarray, prior: InverseKernels
+) -> tuple[np.ndarray, np.ndarray]:
+    """eᵀ C⁻¹ e and log|A| of every segment, each [S]; A = kk + Q⁻¹ = L Lᵀ [3J, 3J].
+
+    kk     Zₐᵀ C₀⁻¹ Zₐ [S, 3J, 3J]
+    kd     b = Zₐᵀ C₀⁻¹ e [S, 3J]
+    dd     eᵀ C₀⁻¹ e [S]
+    prior  Q⁻¹
+
+    The last diagonal element of the Cholesky root of [[A, b], [bᵀ, eᵀ C₀⁻¹ e]] is
+    (eᵀ C₀⁻¹ e - bᵀ A⁻¹ b)^½ = (eᵀ C⁻¹ e)^½; the others give log|A|. Raises np.linalg.LinAlgError
+    where the matrix is not positive definite.
+    """
+    count, n = kd.shape
+    bordered = np.empty((count, n + 1, n + 1))
+    bordered[:, :n, :n] = kk + prior.of(np.arange(count))
+    bordered[:, :n, n], bordered[:, n, :n], bordered[:, n, n] = kd, kd, dd
+    root = np.diagonal(np.linalg.cholesky(bordered), axis1=1, axis2=2)
+    return root[:, n] ** 2, 2.0 * np.log(root[:, :n]).sum(1)
 
 
 def startless(weighed: Weighed, process_noise: ProcessNoise) -> Startless:
@@ -302,21 +261,6 @@ def startless(weighed: Weighed, process_noise: ProcessNoise) -> Startless:
         weighed.zz[:, 6:, 6:] - Za_Z0 @ A_Z0_X[..., :n],
         weighed.logdet + _log_volume_of_start(weighed, P0_inverse),
     )
-
-
-def modes(weighed: Weighed, process_noise: ProcessNoise) -> Modes:
-    """Third elimination prepared: Q = L Lᵀ, Lᵀ (Zₐᵀ C₀⁻¹ Zₐ) L = U diag(f) Uᵀ (Woodbury), so that
-    C⁻¹ = C₀⁻¹ - C₀⁻¹ Zₐ L U diag(1 / (f + λ⁻²)) Uᵀ Lᵀ Zₐᵀ C₀⁻¹ for every factor λ. Raises
-    np.linalg.LinAlgError where the path diverged."""
-    without_start = startless(weighed, process_noise)
-    L = np.linalg.cholesky(process_noise.kernel(weighed.nodes))
-    Lt = np.swapaxes(L, -1, -2)
-    f, U = np.linalg.eigh(Lt @ without_start.kk @ L)
-    Ut = np.swapaxes(U, 1, 2)
-    return Modes(
-        without_start.dd, Ut @ (Lt @ without_start.kd), np.maximum(f, 0.0),
-        Ut @ np.linalg.inv(L), without_start.logdet, np.zeros((*f.shape, 0)),
-    )  # fmt: skip
 
 
 def _log_volume_of_start(weighed: Weighed, P0_inverse: np.ndarray) -> float:

@@ -22,17 +22,10 @@ from shiplog.diagnosis.linear import linearisation, segment_nodes, segments
 from shiplog.diagnosis.linear.linear_segments import Linear, Path
 from shiplog.diagnosis.linear.measurement_correction import read
 from shiplog.diagnosis.linear.parameter_layout import Columns
-from shiplog.diagnosis.noise import discrepancy, likelihood, noise_estimate
-from shiplog.diagnosis.noise.campaign_parts import (
-    marginal,
-    parts_of,
-    picked,
-    products,
-    robust_weights,
-    squares,
-)
+from shiplog.diagnosis.noise import discrepancy, noise_estimate, part_products
+from shiplog.diagnosis.noise.campaign_parts import marginal, parts_of, robust_weights, squares
 from shiplog.diagnosis.noise.discrepancy import Discrepancy
-from shiplog.diagnosis.noise.likelihood import Modes, ProcessNoise
+from shiplog.diagnosis.noise.likelihood import ProcessNoise
 from shiplog.diagnosis.nominal import campaign_prior, nominal_fit, voyage_effects
 from shiplog.diagnosis.nominal.campaign_prior import prior
 from shiplog.diagnosis.nominal.nominal_fit import Converged
@@ -122,15 +115,12 @@ def characteristics(
     sized = [family.columns for family in made.families.families]
     weight = np.ones(len(made.linear.e))
     for round_ in range(LEARNING_ROUNDS):
-        modes = likelihood.modes(
-            likelihood.weighed(made.linear, process_noise), process_noise
-        ).joined(made.accelerations)
-        each = products(modes, made.rows, columns.unit, weight)
+        each = _products(made, process_noise, weight)
         effects = voyage_effects.learn(each, K, anchor, list(groups.values()), sized)
         if round_ == LEARNING_ROUNDS - 1:
             break
         # what parts disagree in is no noise, nor what a few segments are off by
-        weight = _weights(modes, made, effects)
+        weight = _weights(made, effects, process_noise)
         process_noise = _noise_of_parts(made, effects, process_noise, weight >= 1.0)
         expected = nominal_fit.discrepancy_here(sum(each[1:], each[0]), effects.size**-2.0, columns)
         path = _path_about(model, record, at, made, expected, process_noise, numbers)
@@ -146,7 +136,7 @@ def characteristics(
         {f.name: float(effects.size[f.columns[0]]) for f in made.families.families},
         apart,
         share,
-        _noise(modes, made.rows, columns, effects, information, pull, weight),
+        _noise(made, process_noise, effects, information, pull, weight),
         weight,
         at.path,
     )
@@ -166,24 +156,36 @@ def _path_about(
     )
 
 
-def _weights(modes: Modes, made: NominalPass, effects: VoyageEffects) -> np.ndarray:
+def _products(
+    made: NominalPass, process_noise: ProcessNoise, weight: np.ndarray
+) -> list[np.ndarray]:
+    """G of each part, in units, its own numbers in it."""
+    prior = process_noise.inverse_kernels(made.linear.path.acceleration.shape[-1])
+    passes = part_products.passes(
+        made.linear, process_noise, made.rows, made.columns.unit, weight, made.accelerations
+    )
+    return [one.gram(prior).G for one in passes]
+
+
+def _weights(made: NominalPass, effects: VoyageEffects, process_noise: ProcessNoise) -> np.ndarray:
     """w [S]: robust weights of χ²_s with each part's own numbers x + b_i."""
+    return robust_weights(squares(_less_own(made, effects), process_noise), ~made.linear.lost)
+
+
+def _less_own(made: NominalPass, effects: VoyageEffects) -> Linear:
+    """e - J (x + b_i) u: what is left when every part i has its own numbers."""
     assert effects.numbers is not None
-    square = np.empty(len(modes.dd))
+    own = np.empty((len(made.linear.e), len(made.columns.unit)))
     for rows, numbers in zip(made.rows, effects.numbers, strict=True):
-        square[rows] = squares(picked(modes, rows), numbers * made.columns.unit)
-    return robust_weights(square, ~made.linear.lost)
+        own[rows] = numbers * made.columns.unit
+    return made.linear.less_numbers(own, made.accelerations)
 
 
 def _noise_of_parts(
     made: NominalPass, effects: VoyageEffects, process_noise: ProcessNoise, kept: np.ndarray
 ) -> ProcessNoise:
     """σ, q of e - J (x + b_i) u of the `kept` [S] segments, every part i with its own numbers."""
-    assert effects.numbers is not None
-    own = np.empty((len(made.linear.e), len(made.columns.unit)))
-    for rows, numbers in zip(made.rows, effects.numbers, strict=True):
-        own[rows] = numbers * made.columns.unit
-    left = made.linear.less_numbers(own, made.accelerations).pick(kept)
+    left = _less_own(made, effects).pick(kept)
     return noise_estimate.estimate(left, np.zeros(made.columns.linearised), process_noise, rounds=3)
 
 
@@ -227,13 +229,10 @@ def _solved(
 ) -> tuple[np.ndarray, float]:
     """u (M + K)⁻¹ (g + η) [C]: likeliest numbers, SI; and log p(e), the campaign's log evidence
     [nats] (`marginal`, and the volume -½ Σ log|C_s|)."""
-    modes = likelihood.modes(likelihood.weighed(linear, process_noise), process_noise).joined(
-        accelerations
-    )
-    by = np.concatenate(([1.0], columns.unit))
-    G = modes.total(np.ones(len(linear.e))) * np.outer(by, by)
-    M_K = G[1:, 1:] + np.diag(columns.prior_information)
-    value = marginal(G, np.diag(columns.prior_information), anchor) - 0.5 * modes.log_volume()
+    whole = part_products.whole(linear, process_noise, columns.unit, accelerations=accelerations)
+    G, K = whole.G, np.diag(columns.prior_information)
+    M_K = G[1:, 1:] + K
+    value = marginal(G, K, anchor) - 0.5 * whole.volume
     return np.linalg.solve(M_K, G[1:, 0] + anchor) * columns.unit, value
 
 
@@ -247,20 +246,25 @@ def groups_of(model: Extended, columns: Columns, families: Discrepancy) -> dict[
     return found | {f"{f.name} discrepancy": f.columns for f in families.families}
 
 
-def _noise(modes, rows, columns, effects, information, pull, weight) -> float:
+def _noise(
+    made: NominalPass, process_noise: ProcessNoise, effects: VoyageEffects,
+    information: np.ndarray, pull: np.ndarray, weight: np.ndarray,
+) -> float:  # fmt: skip
     """√mean_i (log λ_i)²: root mean square, over the parts i, of the logarithm of the process noise
     over its estimate for the whole campaign,
 
         λ_i = argmax log p(e_i; λ),  x ~ N(Λ⁻¹ η, Λ⁻¹) + b_i integrated out, λ of NOISE_LEVELS
     """
+    nodes = made.linear.path.acceleration.shape[-1]
+    priors = [process_noise.times(by).inverse_kernels(nodes) for by in NOISE_LEVELS]
     found = []
-    for part in rows:
-        own = picked(modes, part)
+    for part in part_products.passes(
+        made.linear, process_noise, made.rows, made.columns.unit, weight, made.accelerations
+    ):
         scores = []
-        for factor in NOISE_LEVELS:
-            gram = products(own, [np.arange(len(part))], columns.unit, weight[part], factor)[0]
-            gram, logdet = reduced(gram, effects.deviation)
-            volume = float(weight[part] @ np.log1p(factor**2 * own.felt).sum(-1)) + logdet
-            scores.append(marginal(gram, information, pull) - 0.5 * volume)
+        for prior_of_noise in priors:
+            of = part.gram(prior_of_noise)
+            gram, logdet = reduced(of.G, effects.deviation)
+            scores.append(marginal(gram, information, pull) - 0.5 * (of.volume + logdet))
         found.append(math.log(NOISE_LEVELS[int(np.argmax(scores))]))
     return float(np.sqrt(np.mean(np.square(found))))

@@ -13,11 +13,14 @@ is further voyages of the ship, with c and b of their own and the same x:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+import operator
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
 from shiplog.diagnosis.noise.campaign_parts import marginal
+from shiplog.diagnosis.noise.part_products import Gram
 from shiplog.diagnosis.nominal.voyage_effects import VoyageEffects, reduced
 
 VOYAGE_SPREADS = (0.0, 0.25, 0.5, 1.0)  # of voyages, in deviations of their parts; each as likely
@@ -46,32 +49,46 @@ def prior(
     return Lambda, Lambda @ m
 
 
+def each_voyage(
+    parts: Iterable[Gram], voyages: np.ndarray, deviation: np.ndarray, within: np.ndarray
+) -> Iterator[tuple[object, Gram]]:
+    """v and G_v = Σ_i G_vi [1 + C, 1 + C] of one voyage after another, its parts' numbers
+    b ~ N(0, diag(within²)) and its own c ~ N(0, diag(deviation²)) integrated out
+    (`voyage_effects.reduced`); to the volumes of the parts each adds log|I + D^½ M D^½|.
+
+    parts    G_vi, products of each part as they are made: one voyage's are held at a time
+    voyages  v of each, those of one voyage after each other
+    """
+    of_parts = zip(voyages.tolist(), parts, strict=True)
+    for name, grouped in itertools.groupby(of_parts, key=operator.itemgetter(0)):
+        own = [one for _, one in grouped]
+        spread, volume = deviation, sum(one.volume for one in own)
+        if len(own) == 1:  # both are of one part: their sum is a Gaussian, too
+            spread, total = np.hypot(deviation, within), own[0].G
+        else:
+            total = np.zeros_like(own[0].G)
+            for one in own:
+                gram, more = reduced(one.G, within)
+                total += gram
+                volume += more
+        gram, more = reduced(total, spread)
+        yield name, Gram(gram, volume + more)
+
+
 def reduce_voyages(
     parts: Sequence[np.ndarray], voyages: np.ndarray, deviation: np.ndarray,
     within: np.ndarray | None = None,
 ) -> tuple[list[np.ndarray], list[float]]:  # fmt: skip
-    """G_v = Σ_i G_vi [1 + C, 1 + C] of each voyage, its own numbers c ~ N(0, diag(deviation²))
-    integrated out (`voyage_effects.reduced`), and log|I + D^½ M D^½| of each.
+    """G_v [1 + C, 1 + C] of each voyage and log|I + D^½ M D^½| of each, as `each_voyage` has them,
+    in the order of v.
 
-    parts     G_vi, products of each part; `voyages` v of each
-    deviation [C] of c
-    within    [C] deviation of a part's own numbers b, where they are not integrated out yet; their
-              volume is then in the voyage's
+    within   none where the parts' own numbers b are integrated out already
     """
     within = np.zeros_like(deviation) if within is None else within
-    found, volumes = [], []
-    for name in np.unique(voyages):
-        own = [gram for gram, of in zip(parts, voyages, strict=True) if of == name]
-        spread, volume = deviation, 0.0
-        if len(own) == 1:  # both are of one part: their sum is a Gaussian, too
-            spread = np.hypot(deviation, within)
-        else:
-            each = [reduced(gram, within) for gram in own]
-            own, volume = [gram for gram, _ in each], sum(of for _, of in each)
-        gram, more = reduced(sum(own[1:], own[0]), spread)
-        found.append(gram)
-        volumes.append(volume + more)
-    return found, volumes
+    order = np.argsort(voyages, kind="stable")
+    given = (Gram(parts[i], 0.0) for i in order)
+    found = [one for _, one in each_voyage(given, voyages[order], deviation, within)]
+    return [one.G for one in found], [one.volume for one in found]
 
 
 def learn(

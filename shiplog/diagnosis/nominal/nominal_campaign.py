@@ -17,8 +17,7 @@ import numpy as np
 from shiplog.diagnosis.linear import segment_nodes, segments
 from shiplog.diagnosis.linear.linear_segments import Linear
 from shiplog.diagnosis.linear.parameter_layout import HELD_INFORMATION
-from shiplog.diagnosis.noise import discrepancy, likelihood
-from shiplog.diagnosis.noise.campaign_parts import products
+from shiplog.diagnosis.noise import discrepancy, part_products
 from shiplog.diagnosis.noise.discrepancy import Discrepancy
 from shiplog.diagnosis.nominal import campaign_prior, nominal_fit, nominal_reference, voyage_effects
 from shiplog.diagnosis.nominal.campaign_characteristics import (
@@ -124,17 +123,21 @@ def learn(
     made = nominal_pass(model, setting, start, record, replace(at, path=found.path), numbers)
     columns, anchor, families = made.columns, made.anchor, made.families
     process_noise, K = found.process_noise, made.columns.prior_information
-    modes = likelihood.modes(likelihood.weighed(made.linear, process_noise), process_noise).joined(
-        made.accelerations
-    )
     unseen = discrepancy.build(
         record.profile, at.process_noise.acceleration, len(columns.unit), discrepancy.OMITTED,
         segment_nodes.conditions_at_nodes(made.linear.cut, segments.grid(record)),
     )  # fmt: skip
-    whole = modes.joined(unseen.accelerations(made.linear.cut, segments.grid(record)))
+    g = segments.grid(record)
+    accelerations = np.concatenate(
+        (made.accelerations, unseen.accelerations(made.linear.cut, g)), -1
+    )
     unit = np.append(columns.unit, np.ones(unseen.count))
     weight = np.where(made.linear.lost, 0.0, found.weight)
-    every = products(whole, made.rows, unit, weight)
+    noise_prior = process_noise.inverse_kernels(g.nodes)
+    passes = part_products.passes(
+        made.linear, process_noise, made.rows, unit, weight, accelerations
+    )
+    every = [one.gram(noise_prior).G for one in passes]
     deviation, size = np.zeros(len(K)), K**-0.5
     for name, where in groups_of(model, columns, families).items():
         deviation[where] = found.deviation.get(name, voyage_effects.UNSEEN_DEVIATION)

@@ -25,7 +25,13 @@ from shiplog.diagnosis.linear.linear_segments import Linear, Path, Wide
 from shiplog.diagnosis.linear.measurement_correction import Moved, read
 from shiplog.diagnosis.linear.parameter_layout import Columns
 from shiplog.diagnosis.linear.segments import Cut, SegmentGrid
-from shiplog.diagnosis.noise import bounds, discrepancy, likelihood, noise_estimate
+from shiplog.diagnosis.noise import (
+    bounds,
+    discrepancy,
+    likelihood,
+    noise_estimate,
+    part_products,
+)
 from shiplog.diagnosis.noise.campaign_parts import marginal
 from shiplog.diagnosis.noise.likelihood import ProcessNoise
 from shiplog.models.causes import Setting
@@ -274,10 +280,10 @@ class _Joint:
         """x̂ = V (g + η), V = (M + K)⁻¹, the coefficients within their bounds; the sizes s_f of each
         family's weights are estimated on the way, s_f² = mean(ŵ² + diag V_ww), SIZE_STEPS times.
         Raises np.linalg.LinAlgError where a matrix is singular."""
-        by = np.concatenate(([1.0], self.columns.unit))
-        modes = likelihood.modes(likelihood.weighed(self.linear, process_noise), process_noise)
-        modes = modes.joined(self.accelerations)
-        G = modes.total(np.ones(len(self.linear.e))) * np.outer(by, by)
+        whole = part_products.whole(
+            self.linear, process_noise, self.columns.unit, accelerations=self.accelerations
+        )
+        G = whole.G
         sizes = dict(sizes)
         for step in range(SIZE_STEPS + 1):
             K = self._prior_information(sizes)
@@ -290,7 +296,7 @@ class _Joint:
                 square = float((x[w] ** 2 + np.diagonal(V)[w]).mean())
                 sizes[family.name] = max(math.sqrt(square), LEAST_SIZE)
         weights = discrepancy_here(G, K, self.columns)
-        value = self._density(G, K) - 0.5 * modes.log_volume()
+        value = self._density(G, K) - 0.5 * whole.volume
         return _Solution(x, gain, weights, sizes, value)
 
     def _density(self, total: np.ndarray, known: np.ndarray) -> float:

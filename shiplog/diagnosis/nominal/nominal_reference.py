@@ -20,7 +20,7 @@ from shiplog.diagnosis.linear import linearisation, segments
 from shiplog.diagnosis.linear.linear_segments import Linear, Wide
 from shiplog.diagnosis.linear.measurement_correction import read
 from shiplog.diagnosis.linear.parameter_layout import HELD_INFORMATION, Columns
-from shiplog.diagnosis.noise import input_misfit, likelihood
+from shiplog.diagnosis.noise import input_misfit, part_products
 from shiplog.diagnosis.noise.campaign_parts import marginal
 from shiplog.diagnosis.noise.input_misfit import Misfit
 from shiplog.diagnosis.noise.likelihood import ProcessNoise
@@ -167,18 +167,19 @@ def assume(
     whole = np.concatenate((at.theta, np.zeros(len(columns.unit) - columns.base)))
     g = segments.grid(record)
     linear = linearisation.linear(model, whole, cut, g, at.path, moved, observed)
-    modes = likelihood.modes(likelihood.weighed(linear, at.process_noise), at.process_noise)
-    wrong = input_misfit.estimate(
-        inputs, linear.cut, g, modes, columns.prior_information, columns.unit,
-        at.process_noise.acceleration,
-    )  # fmt: skip
+    noise = at.process_noise
+    wrong = input_misfit.estimate(inputs, linear, g, noise, columns.prior_information, columns.unit)
     anchor = np.append(anchored(start, at.theta, columns), np.zeros(wrong.count))
     columns = columns.with_misfit(wrong.count)
-    modes = modes.joined(wrong.accelerations(linear.cut, g))
     names = np.unique(linear.cut.voyage)
-    by = np.concatenate(([1.0], columns.unit))
-    each = [modes.total((linear.cut.voyage == v).astype(float)) for v in names]
-    kappa = inflation(np.stack(each) * np.outer(by, by), columns.prior_information, anchor)
+    each = [
+        part_products.whole(
+            linear.pick(linear.cut.voyage == v), noise, columns.unit,
+            accelerations=lambda cut: wrong.accelerations(cut, g),
+        ).G
+        for v in names
+    ]  # fmt: skip
+    kappa = inflation(np.stack(each), columns.prior_information, anchor)
     # without a nominal campaign no cause has a nominal size
     K = columns.prior_information.copy()
     K[columns.base : columns.linearised] = HELD_INFORMATION

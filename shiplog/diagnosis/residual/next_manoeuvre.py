@@ -17,7 +17,7 @@ import numpy as np
 
 from shiplog.diagnosis.linear import linearisation, segments
 from shiplog.diagnosis.linear.measurement_correction import read
-from shiplog.diagnosis.noise import likelihood
+from shiplog.diagnosis.noise import part_products
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.diagnosis.verdict.result import Named
 from shiplog.nomenclature import frames
@@ -156,15 +156,19 @@ def products_of_manoeuvres(
     grid = segments.grid(recorded)
     path = linearisation.fit_path(ref.model, whole, cut, grid, ref.wide, rounds=1)
     linear = linearisation.linear(ref.model, whole, cut, grid, path, moved, observed)
-    modes = likelihood.modes(likelihood.weighed(linear, ref.process_noise), ref.process_noise)
-    if ref.misfit is not None:
-        modes = modes.joined(ref.misfit.accelerations(cut, grid))
-    each = modes.gram().scaled(ref.columns.unit).each
-    found: list[np.ndarray | None] = []
-    for i in range(len(MANOEUVRES)):
-        own = each[cut.voyage == i]
-        found.append(own.sum(0) if kept[i] and len(own) else None)
-    return found
+    accelerations = None if ref.misfit is None else ref.misfit.accelerations(cut, grid)
+    parts = [np.flatnonzero(cut.voyage == i) for i in range(len(MANOEUVRES))]
+    prior = ref.process_noise.inverse_kernels(grid.nodes)
+    return [
+        part_products.part_pass(
+            linear, ref.process_noise, own, ref.columns.unit, np.ones(len(linear.e)), accelerations
+        )
+        .gram(prior)
+        .G
+        if stayed and len(own)
+        else None
+        for own, stayed in zip(parts, kept, strict=True)
+    ]
 
 
 def simulated(trial: Trial, theta: np.ndarray) -> tuple[Record, np.ndarray]:

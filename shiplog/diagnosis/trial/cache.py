@@ -6,21 +6,30 @@ remainder begins where an earlier one converged.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from weakref import ref
 
 import numpy as np
 
+from shiplog.diagnosis.linear.linear_segments import Linear
 from shiplog.diagnosis.linear.measurement_correction import Moved
 from shiplog.diagnosis.linear.segments import Cut
-from shiplog.diagnosis.noise.likelihood import Modes, Weighed
+from shiplog.diagnosis.noise.part_products import PartPass
 from shiplog.diagnosis.noise.remainder import Remainder
 from shiplog.diagnosis.trial.fitted import Start
 
 Numbers = Mapping[str, np.ndarray]
 Read = tuple[Cut, Moved, np.ndarray]  # see `measurement_correction.read`
 Key = tuple[tuple[str, ...], Remainder]  # labels of the included causes, and the remainder
+
+
+@dataclass(frozen=True)
+class Total:
+    """G [1 + C, 1 + C] of all parts (4), and log|R| (5)."""
+
+    G: np.ndarray
+    volume: float
 
 
 @dataclass
@@ -31,16 +40,16 @@ class Cache:
     starts    where fits converged, written by `evaluate.resume`
     readings  numbers of sensors' causes, and the trial as read with them: as it is, and as it was
               last; written by `Trial`. The rest is written by `Products`:
-    modes     of a point, by the shape of the process noise: the first point's, and the last ones
-    totals    of a point, by λ, weights and shape: products and their volume
+    passes    of a point, by weights: the first point's, and the last ones
+    totals    of a point, by λ, weights and shape of the process noise
     volumes   of the first point, the same: log|R|
     voyages   products of each voyage of the last point that they were asked for
     """
 
     starts: dict[Key, Start] = field(default_factory=dict)
     readings: list[tuple[Numbers, Read]] = field(default_factory=list)
-    modes: list[tuple[Weighed, tuple, Modes]] = field(default_factory=list)
     # no id() of a point: one that is gone leaves its own to the next one
-    totals: list[tuple[ref[Weighed], tuple, np.ndarray, float]] = field(default_factory=list)
+    passes: list[tuple[ref[Linear], bytes, Sequence[PartPass]]] = field(default_factory=list)
+    totals: list[tuple[ref[Linear], tuple, Total]] = field(default_factory=list)
     volumes: dict[tuple, float] = field(default_factory=dict)
-    voyages: tuple[ref[Weighed], tuple, dict[object, np.ndarray]] | None = None
+    voyages: tuple[ref[Linear], tuple, dict[object, np.ndarray]] | None = None

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from shiplog.diagnosis.linear.linear_segments import Linear, Path
-from shiplog.diagnosis.noise.likelihood import Weighed
 from shiplog.diagnosis.noise.remainder import Remainder
 
 
@@ -59,7 +58,6 @@ class Point:
     numbers: Mapping[str, np.ndarray]
     path: Path
     linear: Linear
-    weighed: Weighed
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from shiplog.diagnosis.linear import linearisation, segment_nodes, segments
 from shiplog.diagnosis.linear.linear_segments import Linear, Path
 from shiplog.diagnosis.linear.measurement_correction import as_hypothesised, read
 from shiplog.diagnosis.linear.segments import SegmentGrid
-from shiplog.diagnosis.noise import discrepancy, likelihood, residual_acceleration
+from shiplog.diagnosis.noise import discrepancy, residual_acceleration
 from shiplog.diagnosis.noise.campaign_parts import PART, parts_of
 from shiplog.diagnosis.noise.discrepancy import Discrepancy
 from shiplog.diagnosis.noise.likelihood import ProcessNoise
@@ -164,9 +164,7 @@ class Trial:
         linear = linearisation.linear(
             ref.model, whole, cut, self.grid, path, moved, observed, ref.wide
         )
-        return self._refuse_divergent(
-            Point(numbers, path, linear, likelihood.weighed(linear, ref.process_noise))
-        )
+        return self._refuse_divergent(Point(numbers, path, linear))
 
     def _reading(self, numbers: Numbers) -> Read:
         """The segments as read with these numbers, and the effects of all of them on the inputs

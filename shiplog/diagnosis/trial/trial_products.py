@@ -1,31 +1,31 @@
 """Products of a trial's segments with every voyage's and part's own deviations integrated out:
 equations (3) to (5) of this room.
 
-One pass serves every factor λ of the process noise and many hypotheses, so that modes, totals and
-volumes are kept in the trial's cache.
+One pass of a point serves every process noise and many hypotheses: it is kept in the trial's cache,
+with totals and volumes. Products are made part by part and added voyage by voyage.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from weakref import ref
 
 import numpy as np
 
 from shiplog.diagnosis.linear import segment_nodes
-from shiplog.diagnosis.linear.segments import SegmentGrid
-from shiplog.diagnosis.noise import discrepancy, likelihood
-from shiplog.diagnosis.noise.campaign_parts import products
+from shiplog.diagnosis.linear.segments import Cut, SegmentGrid
+from shiplog.diagnosis.noise import discrepancy, part_products
 from shiplog.diagnosis.noise.discrepancy import Discrepancy
-from shiplog.diagnosis.noise.likelihood import Modes
-from shiplog.diagnosis.noise.remainder import Remainder
+from shiplog.diagnosis.noise.likelihood import ProcessNoise
+from shiplog.diagnosis.noise.part_products import Gram, PartPass
+from shiplog.diagnosis.noise.remainder import NOMINAL, Remainder
 from shiplog.diagnosis.nominal import campaign_prior
 from shiplog.diagnosis.nominal.nominal_campaign import Campaign
-from shiplog.diagnosis.trial.cache import Cache
+from shiplog.diagnosis.trial.cache import Cache, Total
 from shiplog.diagnosis.trial.fitted import Point
 
-KEPT_MODES = 4  # 20 MB each
+KEPT_PASSES = 3  # 0.2 MB a segment each
 KEPT_TOTALS = 41  # one point needs about a dozen levels, and again for each family
 
 
@@ -45,56 +45,65 @@ class Products:
     voyage: np.ndarray
     cache: Cache
 
-    def modes(self, point: Point, noise_factor: float, remainder: Remainder) -> tuple[Modes, float]:
-        """Modes of the process noise at a point, and the factor λ to divide them by (2). One pass
-        serves every λ, but that of an intermittent force together with the process noise, whose
-        axes turn with it."""
-        rows = segment_nodes.rows_of_nodes(point.linear.cut.rows, self.grid)
-        process_noise = remainder.apply_to(self.campaign.reference.process_noise, rows)
-        shape, left = remainder.shape, noise_factor
-        if process_noise.intermittent is not None:
-            process_noise, shape, left = process_noise.times(noise_factor), (shape, left), 1.0
-        for of, known, modes in self.cache.modes:
-            if of is point.weighed and known == shape:
-                return modes, left
-        modes = self._join_families(likelihood.modes(point.weighed, process_noise), point)
-        first, last = self.cache.modes[:1], self.cache.modes[1:][2 - KEPT_MODES :]
-        self.cache.modes = [*first, *last, (point.weighed, shape, modes)]
-        return modes, left
+    def _passes(self, point: Point, weight: np.ndarray) -> Sequence[PartPass]:
+        """The point's parts without their starts, with the columns of every family."""
+        key = weight.tobytes()
+        kept = [one for one in self.cache.passes if one[0]() is not None]
+        for of, known, passes in kept:
+            if of() is point.linear and known == key:
+                return passes
+        reference = self.campaign.reference
+        unit = np.append(reference.columns.unit, np.ones(self.omitted.count))
+        passes = tuple(
+            part_products.passes(
+                point.linear, reference.process_noise, self.parts, unit, weight, self._accelerations
+            )
+        )
+        self.cache.passes = [
+            *kept[:1],
+            *kept[1:][2 - KEPT_PASSES :],
+            (ref(point.linear), key, passes),
+        ]
+        return passes
 
-    def _join_families(self, modes: Modes, point: Point) -> Modes:
-        """With the columns of the discrepancy: a weight w acts as an acceleration W w."""
-        cut, misfit = point.linear.cut, self.campaign.reference.misfit
-        if misfit is not None:
-            modes = modes.joined(misfit.accelerations(cut, self.grid))
-        return modes.joined(self.omitted.accelerations(cut, self.grid))
+    def _accelerations(self, cut: Cut) -> np.ndarray:
+        """Φ of the discrepancy: a weight w acts as an acceleration Φ w."""
+        misfit = self.campaign.reference.misfit
+        of = [] if misfit is None else [misfit.accelerations(cut, self.grid)]
+        return np.concatenate([*of, self.omitted.accelerations(cut, self.grid)], -1)
+
+    def process_noise(self, cut: Cut, noise: float, remainder: Remainder) -> ProcessNoise:
+        """That of a trial's segments together with a remainder, times λ = `noise`."""
+        rows = segment_nodes.rows_of_nodes(cut.rows, self.grid)
+        return remainder.apply_to(self.campaign.reference.process_noise, rows).times(noise)
 
     def each_part(
         self, point: Point, noise: float, weight: np.ndarray, remainder: Remainder
-    ) -> list[np.ndarray]:
+    ) -> Iterator[Gram]:
         """G_k [1 + C, 1 + C] of each part (3), its own deviations in it. C are the columns of the
         reference; those of the families that no campaign shows are there where the remainder is
         one of them, since they are a quarter of all."""
-        modes, noise = self.modes(point, noise, remainder)
-        unit = self.campaign.reference.columns.unit
-        if remainder.kind in discrepancy.OMITTED:
-            unit = np.append(unit, np.ones(self.omitted.count))
-        return products(modes.first(len(unit)), self.parts, unit, weight, noise)
+        of = self.process_noise(point.linear.cut, noise, remainder)
+        prior, size = of.inverse_kernels(self.grid.nodes), 1 + len(self._deviation(remainder))
+        for one in self._passes(point, weight):
+            yield one.gram(prior, size)
 
-    def total(
-        self, point: Point, noise: float, weight: np.ndarray, remainder: Remainder
-    ) -> tuple[np.ndarray, float]:
-        """G [1 + C, 1 + C] of all parts (4), C as in `each_part`, and Σ log|I + D^½ M D^½| (5)."""
+    def total(self, point: Point, noise: float, weight: np.ndarray, remainder: Remainder) -> Total:
+        """G [1 + C, 1 + C] of all parts (4), C as in `each_part`, and log|R| (5)."""
         key = (noise, weight.tobytes(), remainder.shape)
         size = 1 + len(self._deviation(remainder))
-        for of, known, G, volume in self.cache.totals:
-            if of() is point.weighed and known == key and len(G) >= size:
-                return G if len(G) == size else G[:size, :size], volume
-        voyages, volume = self._voyages(point, noise, weight, remainder)
-        G = _sum(voyages.values())
-        kept = (ref(point.weighed), key, G, volume)
+        for of, known, kept in self.cache.totals:
+            if of() is point.linear and known == key and len(kept.G) >= size:
+                return kept if len(kept.G) == size else Total(kept.G[:size, :size], kept.volume)
+        whole = np.zeros((size, size))
+        logdet = sum(one.logdet for one in self._passes(point, weight))
+        for _, one in self._voyages(point, noise, weight, remainder):
+            whole += one.G
+            logdet += one.volume
+        found = Total(whole, logdet)
+        kept = (ref(point.linear), key, found)
         self.cache.totals = [*self.cache.totals[1 - KEPT_TOTALS :], kept]
-        return G, volume
+        return found
 
     def leave_out(
         self, point: Point, noise: float, weight: np.ndarray, remainder: Remainder,
@@ -111,24 +120,25 @@ class Products:
             if of in gone
         )
         if not whole or len(gone) == len(set(self.voyage)):
-            return self.total(point, noise, np.where(left_out, 0.0, weight), remainder)[0]
+            return self.total(point, noise, np.where(left_out, 0.0, weight), remainder).G
         key = (noise, weight.tobytes(), remainder)
         kept = self.cache.voyages
-        if kept is None or kept[0]() is not point.weighed or kept[1] != key:
-            voyages, _ = self._voyages(point, noise, weight, remainder)
-            self.cache.voyages = kept = (ref(point.weighed), key, voyages)
+        if kept is None or kept[0]() is not point.linear or kept[1] != key:
+            every = self._voyages(point, noise, weight, remainder)
+            voyages = {of: one.G for of, one in every}
+            self.cache.voyages = kept = (ref(point.linear), key, voyages)
         return _sum([G for of, G in kept[2].items() if of not in gone])
 
     def _voyages(
         self, point: Point, noise: float, weight: np.ndarray, remainder: Remainder
-    ) -> tuple[dict[object, np.ndarray], float]:
-        """G of each voyage with b_k and c_v integrated out (4), and Σ log|I + D^½ M D^½| (5)."""
+    ) -> Iterator[tuple[object, Gram]]:
+        """G of each voyage with b_k and c_v integrated out (4), and its share of log|R| (5) but for
+        instruments and starts."""
         each = self.each_part(point, noise, weight, remainder)
         deviation = self._deviation(remainder)
-        G, volumes = campaign_prior.reduce_voyages(
+        return campaign_prior.each_voyage(
             each, self.voyage, self.campaign.apart * deviation, deviation
         )
-        return dict(zip(np.unique(self.voyage), G, strict=True)), sum(volumes)
 
     def _deviation(self, remainder: Remainder) -> np.ndarray:
         """The diagonal of D^½ [C]; of the families that no campaign shows there is none."""
@@ -143,9 +153,8 @@ class Products:
         with less damping would gain evidence because it amplifies the noise."""
         key = (noise_factor, remainder.shape, weight.tobytes())
         if key not in self.cache.volumes:
-            modes, by = self.modes(first, noise_factor, remainder)
-            total = self.total(first, noise_factor, weight, remainder)
-            self.cache.volumes[key] = modes.log_volume(by, weight) + total[1]
+            alike = replace(remainder, kind=NOMINAL)  # a family has no deviation of its own
+            self.cache.volumes[key] = self.total(first, noise_factor, weight, alike).volume
         return self.cache.volumes[key]
 
 
