@@ -158,3 +158,32 @@ def test_a_small_deviation_of_what_repeats_well_is_found():
         each.append(products(j, j @ own + rng.standard_normal(60)))
     found = learn(each, np.ones(3), np.zeros(3), (np.arange(3),))
     assert found.deviation == pytest.approx(np.full(3, true), rel=0.36)  # three of its deviations
+
+
+@pytest.mark.parametrize("count", (1, 63, 150, 219))
+def test_an_inverse_by_halves_of_its_root_is_the_inverse(count):
+    """Of I + K, as `reduced` has it, where K has eigenvalues from nothing to a million."""
+    rng = np.random.default_rng(count)
+    turned, _ = np.linalg.qr(rng.standard_normal((count, count)))
+    values = 1.0 + np.logspace(6.0, -4.0, count)
+    matrix = (turned * values) @ turned.T
+    matrix = 0.5 * (matrix + matrix.T)
+    found, volume = voyage_effects.inverse_and_volume(matrix)
+    wanted = (turned / values) @ turned.T
+    assert found == pytest.approx(wanted, abs=1e-9)
+    assert volume == pytest.approx(np.log(values).sum(), abs=1e-8)
+    with pytest.raises(np.linalg.LinAlgError):
+        voyage_effects.inverse_and_volume(matrix - 2.0 * values[0] * np.eye(count))
+
+
+def test_columns_without_a_deviation_between_and_behind_the_others():
+    """They keep what they say of themselves, less what the others explain: a Schur complement."""
+    rng = np.random.default_rng(3)
+    rows = rng.standard_normal((40, 9))
+    gram, deviation = rows.T @ rows, np.array([0.3, 0.0, 1.2, 0.0, 0.7, 0.1, 0.0, 0.0])
+    found, volume = reduced(gram, deviation)
+    free = np.flatnonzero(deviation) + 1
+    columns = rows[:, free] * deviation[free - 1]
+    noise = np.eye(40) + columns @ columns.T
+    assert found == pytest.approx(rows.T @ np.linalg.solve(noise, rows), rel=1e-9, abs=1e-9)
+    assert volume == pytest.approx(np.linalg.slogdet(noise)[1], rel=1e-9)

@@ -169,7 +169,7 @@ class Whitening:
 class Weighed:
     """Products of one pass under one instrument noise R, before the process noise is included.
 
-    dd      [S, 1 + C, 1 + C]        Eᵀ R⁻¹ E,  E = [e | J]
+    dd      [S, 1 + C, 1 + C]        Eᵀ R⁻¹ E,  E = [e | J]; of a sum Σ w Eᵀ R⁻¹ E [1 + C, 1 + C]
     zd      [S, 6 + 3J, 1 + C]       Zᵀ R⁻¹ E
     zz      [S, 6 + 3J, 6 + 3J]      Zᵀ R⁻¹ Z
     logdet  log|R|, over the observations used
@@ -183,14 +183,23 @@ class Weighed:
     nodes: int
 
 
-def weighed(linear: Linear, process_noise: ProcessNoise) -> Weighed:
-    """Eᵀ R⁻¹ E, Zᵀ R⁻¹ E, Zᵀ R⁻¹ Z of every segment, and log|R| (first elimination)."""
+def weighed(
+    linear: Linear, process_noise: ProcessNoise, weight: np.ndarray | None = None
+) -> Weighed:
+    """Eᵀ R⁻¹ E, Zᵀ R⁻¹ E, Zᵀ R⁻¹ Z of every segment, and log|R| (first elimination). With weights w
+    [S], Σ_s w_s Eᵀ R⁻¹ E alone, without making each."""
     white = Whitening(linear.cut.used, process_noise)
     E = white(np.concatenate((linear.e[..., None], linear.j), -1))
     Z = white(linear.z)
     Zt = np.swapaxes(Z, 1, 2)
-    nodes = (Z.shape[-1] - 6) // 3
-    return Weighed(np.swapaxes(E, 1, 2) @ E, Zt @ E, Zt @ Z, white.logdet, nodes)
+    zd, zz, nodes = Zt @ E, Zt @ Z, (Z.shape[-1] - 6) // 3
+    if weight is None:
+        dd = np.swapaxes(E, 1, 2) @ E
+    else:
+        E *= np.sqrt(weight)[:, None, None]
+        rows = E.reshape(-1, E.shape[-1])
+        dd = rows.T @ rows
+    return Weighed(dd, zd, zz, white.logdet, nodes)
 
 
 @dataclass(frozen=True)
@@ -242,32 +251,40 @@ def roots(
 
 
 def startless(weighed: Weighed, process_noise: ProcessNoise) -> Startless:
-    """Second elimination, of the start: X ← Xᵀ R⁻¹ X - Xᵀ R⁻¹ Z₀ (F + P₀⁻¹)⁻¹ Z₀ᵀ R⁻¹ X of
-    X = (E | Zₐ), F = Z₀ᵀ R⁻¹ Z₀. Raises np.linalg.LinAlgError where the path diverged."""
+    """Second elimination, of the start (`start_of`). Raises np.linalg.LinAlgError where the path
+    diverged."""
+    kk, kd, Y = start_of(weighed, process_noise)
+    dd = weighed.dd - np.swapaxes(Y, 1, 2) @ Y
+    logdet = weighed.logdet + log_volume_of_start(weighed, process_noise)
+    return Startless(dd, kd, kk, logdet)
+
+
+def start_of(
+    weighed: Weighed, process_noise: ProcessNoise
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What eliminates the start: with F = Z₀ᵀ R⁻¹ Z₀ and F + P₀⁻¹ = L Lᵀ, of X = (E | Zₐ)
+
+        Y = L⁻¹ Z₀ᵀ R⁻¹ X,   Xᵀ C₀⁻¹ X = Xᵀ R⁻¹ X - Yᵀ Y
+
+    as Zₐᵀ C₀⁻¹ Zₐ [S, 3J, 3J], Zₐᵀ C₀⁻¹ E [S, 3J, 1 + C], and Y_E [S, 6, 1 + C]. Raises
+    np.linalg.LinAlgError where the path diverged."""
     if not (np.isfinite(weighed.zz).all() and np.isfinite(weighed.dd).all()):
         raise np.linalg.LinAlgError("the path diverged: it has no products")
-    P0_inverse = np.diag(process_noise.start**-2.0)
-    A = weighed.zz[:, :6, :6] + P0_inverse  # F + P₀⁻¹
+    A = weighed.zz[:, :6, :6] + np.diag(process_noise.start**-2.0)  # F + P₀⁻¹
     # in units of each number of the start, or its columns are too unlike to invert
     unit = np.diagonal(A, axis1=1, axis2=2) ** -0.5
-    A = A * unit[:, :, None] * unit[:, None, :]
-    Z0_X = np.concatenate((weighed.zz[:, :6, 6:], weighed.zd[:, :6]), -1) * unit[..., None]
-    A_Z0_X = np.linalg.solve(A, Z0_X)
-    n = weighed.zz.shape[-1] - 6  # 3J
-    Za_Z0, Z0_E = np.swapaxes(Z0_X[..., :n], 1, 2), Z0_X[..., n:]
-    return Startless(
-        weighed.dd - np.swapaxes(Z0_E, 1, 2) @ A_Z0_X[..., n:],
-        weighed.zd[:, 6:] - Za_Z0 @ A_Z0_X[..., n:],
-        weighed.zz[:, 6:, 6:] - Za_Z0 @ A_Z0_X[..., :n],
-        weighed.logdet + _log_volume_of_start(weighed, P0_inverse),
-    )
+    L = np.linalg.cholesky(A * unit[:, :, None] * unit[:, None, :])
+    by = np.linalg.inv(L) * unit[:, None, :]
+    Y_a, Y_E = by @ weighed.zz[:, :6, 6:], by @ weighed.zd[:, :6]
+    Yt = np.swapaxes(Y_a, 1, 2)
+    return weighed.zz[:, 6:, 6:] - Yt @ Y_a, weighed.zd[:, 6:] - Yt @ Y_E, Y_E
 
 
-def _log_volume_of_start(weighed: Weighed, P0_inverse: np.ndarray) -> float:
+def log_volume_of_start(weighed: Weighed, process_noise: ProcessNoise) -> float:
     """Σ_s log|F + P₀⁻¹| - log|F|, F = Z₀ᵀ R⁻¹ Z₀ [S, 6, 6]; 10⁻⁹ P₀⁻¹ keeps F invertible."""
     # Restricted likelihood (Patterson & Thompson 1971): how far a model lets a start be felt is
     # no evidence, and a ship with less damping would be punished for it, segment by segment.
-    F = weighed.zz[:, :6, :6]
+    F, P0_inverse = weighed.zz[:, :6, :6], np.diag(process_noise.start**-2.0)
     each = np.linalg.slogdet(F + P0_inverse)[1] - np.linalg.slogdet(F + 1e-9 * P0_inverse)[1]
     return float(each.sum())
 

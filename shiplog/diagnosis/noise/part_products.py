@@ -42,7 +42,7 @@ Accelerations = np.ndarray | Callable[[Cut], np.ndarray]
 class PartPass:
     """A part's segments without their starts; those of no weight are left out.
 
-    total   T [N, N], N = 1 + C + W; its lower half is that of T
+    total   lower half of T [N, N], N = 1 + C + W; zeros above its diagonal
     across  [S, 3J, N]  B
     within  [S, 3J, 3J]  K
     weight  w [S]
@@ -85,9 +85,10 @@ class Gram:
 
 
 def _both_halves(lower: np.ndarray) -> np.ndarray:
-    """A symmetric matrix from its lower half, in C order."""
-    whole = np.tril(lower)
-    return np.ascontiguousarray(whole + np.tril(lower, -1).T)
+    """A symmetric matrix from its lower half, with zeros above that."""
+    whole = lower + lower.T
+    whole[np.diag_indices(len(whole))] *= 0.5
+    return whole
 
 
 def part_pass(
@@ -102,24 +103,28 @@ def part_pass(
     Raises np.linalg.LinAlgError where the path diverged.
     """
     own, w = linear.pick(rows), weight[rows]
-    passed = likelihood.startless(likelihood.weighed(own, process_noise), process_noise)
+    weighed = likelihood.weighed(own, process_noise, w)
+    kk, kd, Y = likelihood.start_of(weighed, process_noise)
+    logdet = weighed.logdet + likelihood.log_volume_of_start(weighed, process_noise)
+    Y = (np.sqrt(w)[:, None, None] * Y).reshape(-1, Y.shape[-1])
+    EtE = weighed.dd - Y.T @ Y  # Σ_s w_s Eᵀ C₀⁻¹ E
     kept = w > 0.0
-    w, kd, kk, dd = w[kept], passed.kd[kept], passed.kk[kept], passed.dd[kept]
-    size = dd.shape[-1]
-    by = np.concatenate(([1.0], unit))
-    if accelerations is None:
-        phi = np.zeros((len(w), kk.shape[-1], 0))
-    elif callable(accelerations):
-        phi = accelerations(own.cut)[kept]
-    else:
-        phi = accelerations[rows[kept]]
+    if not kept.all():
+        rows, w, kk, kd = rows[kept], w[kept], kk[kept], kd[kept]
+    phi = np.zeros((len(w), kk.shape[-1], 0))
+    if accelerations is not None:
+        phi = accelerations(own.cut)[kept] if callable(accelerations) else accelerations[rows]
+    root = np.sqrt(w)[:, None, None]
     across = np.concatenate((kd, kk @ phi), -1)
-    T = np.empty((len(by), len(by)))
-    T[:size, :size] = np.tensordot(w, dd, 1)
-    T[size:] = np.tensordot(w[:, None, None] * phi, across, ((0, 1), (0, 1)))
-    T[:size, size:] = T[size:, :size].T
-    across *= np.sqrt(w)[:, None, None] * by
-    return PartPass(T * np.outer(by, by), across, kk, w, rows[kept], passed.logdet)
+    across *= root * np.concatenate(([1.0], unit))
+    phi = root * unit[kd.shape[-1] - 1 :] * phi
+    T = np.zeros((1 + len(unit),) * 2)
+    size = len(EtE)
+    by = np.concatenate(([1.0], unit[: size - 1]))
+    T[:size, :size] = np.tril(EtE * np.outer(by, by))
+    if size < len(T):
+        T[size:] = np.tril(np.tensordot(phi, across, ((0, 1), (0, 1))), size)
+    return PartPass(T, across, kk, w, rows, logdet)
 
 
 def passes(

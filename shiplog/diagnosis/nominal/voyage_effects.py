@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cholesky, get_lapack_funcs, solve_triangular
+from scipy.linalg import cholesky, get_lapack_funcs
 
 EM_ROUNDS = 15  # of three steps of expectation-maximisation each, at most
 CONVERGED = 0.1  # of the logarithm of a variance: a round that moves none by more is the last
@@ -26,6 +26,10 @@ BOUNDS = (-20.0, 10.0)  # of the logarithm of a variance: 5e-5 to 150 plausible 
 FIRST_DEVIATION = 0.1  # at which it begins, in units of a number's plausible size
 LEAST_DEVIATION = 0.001  # of one pseudo-part, so that a variance cannot become zero
 UNSEEN_DEVIATION = 0.02  # of numbers that the nominal campaign says nothing of
+
+AT_ONCE = 64  # rows of a root that LAPACK inverts; a larger one by halves
+
+_trtri, _lauum = get_lapack_funcs(("trtri", "lauum"), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -40,22 +44,40 @@ class VoyageEffects:
 
 def reduced(gram: np.ndarray, deviation: np.ndarray) -> tuple[np.ndarray, float]:
     """G - G_•F D^½ (I + D^½ M_FF D^½)⁻¹ D^½ G_F•, a part's products with its own b integrated out,
-    and log|I + D^½ M_FF D^½|.
+    and log|I + D^½ M_FF D^½|. One inverse gives it all: with H the rows that are not F, and
+
+        R = (I + D^½ M_FF D^½)⁻¹:   FF  D^-½ (I - R) D^-½
+                                    FH  D^-½ R D^½ G_FH
+                                    HH  G_HH - G_HF D^½ R D^½ G_FH
 
     gram        G [1 + C, 1 + C]
     deviation   D^½ [C]; F where it is greater than zero
 
     Raises np.linalg.LinAlgError where the products are not those of a covariance.
     """
-    F = np.flatnonzero(deviation > 0.0)
-    if not len(F):
+    D_half = np.append(0.0, deviation)
+    if not D_half.any():
         return gram, 0.0
-    D_half = deviation[F]
-    A = np.outer(D_half, D_half) * gram[np.ix_(1 + F, 1 + F)]
-    A[np.diag_indices(len(F))] += 1.0
-    L = cholesky(A, lower=True, check_finite=False)  # L Lᵀ = I + D^½ M D^½
-    half = solve_triangular(L, D_half[:, None] * gram[1 + F], lower=True, check_finite=False)
-    return gram - half.T @ half, 2.0 * float(np.log(np.diagonal(L)).sum())
+    count = int(np.flatnonzero(D_half)[-1]) + 1  # rows up to the last that has a b
+    H = np.append(np.flatnonzero(D_half[:count] == 0.0), np.arange(count, len(gram)))
+    D_half = D_half[:count]
+    scale = D_half[:, None] * D_half
+    A = gram[:count, :count] * scale  # rows of H are those of the identity, and R's are then too
+    A[np.diag_indices(count)] += 1.0
+    R, volume = inverse_and_volume(A)
+    G_H = gram[:, H]
+    D_G = D_half[:, None] * G_H[:count]
+    R_D_G = R @ D_G
+    HH = G_H[H] - D_G.T @ R_D_G
+    found = np.empty_like(gram)
+    F = D_half > 0.0
+    np.divide(1.0, D_half, out=D_half, where=F)
+    R[np.diag_indices(count)] -= 1.0
+    np.multiply(R, -D_half[:, None] * D_half, out=found[:count, :count])
+    FH = D_half[:, None] * R_D_G
+    found[:count, H], found[H, :count] = FH, FH.T
+    found[np.ix_(H, H)] = HH
+    return found, volume
 
 
 def own_numbers(gram: np.ndarray, common: np.ndarray, deviation: np.ndarray) -> np.ndarray:
@@ -165,12 +187,12 @@ class _EffectsProblem:
         scale = np.outer(D_half, D_half)
         information, pull, of_parts = np.diag(K), self.pull.copy(), []
         for part in self.parts:
-            S = _inverse(np.eye(len(F)) + scale * part.both) * scale  # (D⁻¹ + M)⁻¹
+            S = inverse_and_volume(np.eye(len(F)) + scale * part.both)[0] * scale  # (D⁻¹ + M)⁻¹
             T = S @ part.own
             information += part.m - part.own.T @ T
             pull += part.g - T.T @ part.own_g
             of_parts.append((S, T))
-        V = _inverse(information)
+        V, _ = inverse_and_volume(information)
         x = V @ pull
         b_squares = np.zeros(len(D))
         numbers = np.repeat(x[None], len(self.parts), axis=0)
@@ -186,16 +208,30 @@ class _EffectsProblem:
         return np.log(np.array(variances)), numbers
 
 
-def _inverse(matrix: np.ndarray) -> np.ndarray:
-    """A⁻¹ = L⁻ᵀ L⁻¹, A = L Lᵀ positive definite. Raises np.linalg.LinAlgError where it is not."""
+def inverse_and_volume(matrix: np.ndarray) -> tuple[np.ndarray, float]:
+    """A⁻¹ = L⁻ᵀ L⁻¹ and log|A|, A = L Lᵀ positive definite. Raises np.linalg.LinAlgError where it
+    is not."""
     if not len(matrix):
-        return matrix
-    root = cholesky(matrix, lower=True, check_finite=False)
-    (potri,) = get_lapack_funcs(("potri",), (root,))
-    lower, failed = potri(root, lower=True)
-    if failed:
-        raise np.linalg.LinAlgError("a matrix is singular")
-    return np.tril(lower) + np.tril(lower, -1).T
+        return matrix, 0.0
+    L = cholesky(matrix, lower=True, check_finite=False)
+    half, _ = _lauum(_inverse_root(L), lower=True, overwrite_c=True)
+    whole = half + half.T  # above the diagonal of a root there are zeros
+    whole[np.diag_indices(len(whole))] *= 0.5
+    return whole, 2.0 * float(np.log(np.diagonal(L)).sum())
+
+
+def _inverse_root(L: np.ndarray) -> np.ndarray:
+    """L⁻¹ of a Cholesky root, by halves while it is large, as products of matrices are three times
+    as fast as LAPACK's inverse:  [[A, 0], [B, C]]⁻¹ = [[A⁻¹, 0], [-C⁻¹ B A⁻¹, C⁻¹]]."""
+    count = len(L)
+    if count <= AT_ONCE:
+        return _trtri(L, lower=True)[0]
+    half = count // 2
+    whole = np.zeros((count, count), order="F")
+    first, second = _inverse_root(L[:half, :half]), _inverse_root(L[half:, half:])
+    whole[:half, :half], whole[half:, half:] = first, second
+    whole[half:, :half] = -second @ (L[half:, :half] @ first)
+    return whole
 
 
 def _mean(total: float, count: int) -> float:
