@@ -17,10 +17,12 @@ Zₐ for the columns of Z by the start and by the acceleration at the nodes.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from shiplog.diagnosis.linear.linear_segments import Linear
+from shiplog.simulation.kernel import bordered_roots
 from shiplog.voyages.rows.timescale import BIN, NODE_STEP
 
 INTERMITTENT_TIME_S = 12.0  # s, of an intermittent force on a three-metre ship: several bins
@@ -224,30 +226,13 @@ class Startless:
         where a matrix is not positive definite."""
         prior = process_noise.inverse_kernels(self.kk.shape[-1] // 3)
         every = np.arange(len(self.kk))
-        each, logs = roots(self.kk, self.kd[..., 0], self.dd[:, 0, 0], prior)
+        each, logs = bordered_roots.roots(self._packed, prior.inverse, prior.which)
         return each, self.logdet + float((logs + prior.logdet(every)).sum())
 
-
-def roots(
-    kk: np.ndarray, kd: np.ndarray, dd: np.ndarray, prior: InverseKernels
-) -> tuple[np.ndarray, np.ndarray]:
-    """eᵀ C⁻¹ e and log|A| of every segment, each [S]; A = kk + Q⁻¹ = L Lᵀ [3J, 3J].
-
-    kk     Zₐᵀ C₀⁻¹ Zₐ [S, 3J, 3J]
-    kd     b = Zₐᵀ C₀⁻¹ e [S, 3J]
-    dd     eᵀ C₀⁻¹ e [S]
-    prior  Q⁻¹
-
-    The last diagonal element of the Cholesky root of [[A, b], [bᵀ, eᵀ C₀⁻¹ e]] is
-    (eᵀ C₀⁻¹ e - bᵀ A⁻¹ b)^½ = (eᵀ C⁻¹ e)^½; the others give log|A|. Raises np.linalg.LinAlgError
-    where the matrix is not positive definite.
-    """
-    count, n = kd.shape
-    bordered = np.empty((count, n + 1, n + 1))
-    bordered[:, :n, :n] = kk + prior.of(np.arange(count))
-    bordered[:, :n, n], bordered[:, n, :n], bordered[:, n, n] = kd, kd, dd
-    root = np.diagonal(np.linalg.cholesky(bordered), axis1=1, axis2=2)
-    return root[:, n] ** 2, 2.0 * np.log(root[:, :n]).sum(1)
+    @cached_property
+    def _packed(self) -> bordered_roots.Packed:
+        """What hundreds of evaluations of a noise have in common."""
+        return bordered_roots.packed(self.kk, self.kd[..., 0], self.dd[:, 0, 0])
 
 
 def startless(weighed: Weighed, process_noise: ProcessNoise) -> Startless:
