@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         compare,
         convert,
         diagnose,
+        diagnose_list,
         evaluate,
         gate,
         ingest,
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from shiplog.exceptions import ShiplogError
     from shiplog.report.diagnosis.diagnosis import Diagnosis
     from shiplog.report.evaluation.evaluation import Evaluation
+    from shiplog.report.fleet.fleet import Fleet
     from shiplog.training.runs.load_model import Run
     from shiplog.voyages.store.store import Store
     from shiplog.voyages.store.voyage import Voyage
@@ -50,6 +52,7 @@ __all__ = [
     "Diagnosis",
     "Draft",
     "Evaluation",
+    "Fleet",
     "Gate",
     "Ingested",
     "Run",
@@ -62,6 +65,7 @@ __all__ = [
     "compare",
     "convert",
     "diagnose",
+    "diagnose_list",
     "evaluate",
     "gate",
     "ingest",
@@ -79,6 +83,7 @@ _CLASSES = {
     "Diagnosis": "report.diagnosis.diagnosis",
     "Draft": "commands.convert",
     "Evaluation": "report.evaluation.evaluation",
+    "Fleet": "report.fleet.fleet",
     "Gate": "commands.gate",
     "Ingested": "commands.prepare",
     "Run": "training.runs.load_model",

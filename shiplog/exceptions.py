@@ -91,6 +91,10 @@ class UnreadableError(RunError):
     """A file of a run folder is not what was written there, or is missing."""
 
 
+class FleetError(ShiplogError):
+    """A list of ships cannot be read, or says something that cannot be."""
+
+
 class ModelError(ShiplogError):
     """A dynamic model cannot be built, rolled out or identified from what is given."""
 

@@ -34,7 +34,9 @@ ROOMS = {
     ),
     "training": ("settings", "network", "physics", "runs"),
     "diagnosis": ("linear", "noise", "nominal", "trial", "hypotheses", "verdict", "residual"),
-    "report": ("evaluation", "figures", "viewer", "diagnosis", "paper", "page", "gate"),
+    "report": (
+        "evaluation", "figures", "viewer", "diagnosis", "paper", "page", "gate", "fleet",
+    ),
 }  # fmt: skip
 LEVEL = {name: level for level, name in enumerate(ROWS)}
 SOURCES = sorted((ROOT / "shiplog").rglob("*.py"))

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from shiplog.commands.sensors import SensorComparison
     from shiplog.report.diagnosis.diagnosis import Diagnosis
     from shiplog.report.evaluation.evaluation import Evaluation
+    from shiplog.report.fleet.fleet import Fleet
     from shiplog.training.runs.load_model import Run
 
     AnyRun = Run | str | Path
@@ -264,6 +265,28 @@ def diagnose(
     return diagnosing.diagnose_run(
         path, Store(_path(store)), _names(voyages), Path(out), extend=to, cause_files=_files(causes)
     )
+
+
+def diagnose_list(
+    ships: str | Path,
+    *,
+    out: str | Path = "diagnosis",
+    jobs: int | None = None,
+    causes: Files = (),
+) -> Fleet:
+    """Many ships, each in a process of its own; one that fails costs its own row.
+
+    ships    CSV file with the columns run, store and voyages, a line a ship
+    out      folder for the table, and for the folder of each diagnosis; what an earlier call did
+             there from the same inputs is not done again
+    jobs     ships at a time; one a core unless given
+    causes   as for `diagnose`
+
+    Raises ShiplogError for a list that cannot be read; `.failed` has the ships without a verdict.
+    """
+    from shiplog.commands import fleet
+
+    return fleet.diagnose_list(Path(ships), Path(out), jobs=jobs, cause_files=_files(causes))
 
 
 def gate(

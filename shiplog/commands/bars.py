@@ -32,9 +32,13 @@ BYTES_PER_S = 1.5e6
 
 
 class Bars:
-    """A bar for all tasks, weighted by their cost, and one for each task in progress."""
+    """A bar for all tasks, weighted by their cost, and one for each task in progress.
 
-    def __init__(self, costs: Mapping[str, float]) -> None:
+    noun   what one task is
+    """
+
+    def __init__(self, costs: Mapping[str, float], noun: str = "training") -> None:
+        self._noun = noun
         self._cost = dict(costs)
         self._whole = sum(costs.values()) or 1.0
         self._share = dict.fromkeys(costs, 0.0)
@@ -45,7 +49,7 @@ class Bars:
         self._progress: Progress | None = None
         if costs and drawable():
             self._progress = _columns()
-            self._all = self._progress.add_task(counted(len(costs), "training"), total=1.0)
+            self._all = self._progress.add_task(counted(len(costs), noun), total=1.0)
 
     def __enter__(self) -> Bars:
         if self._progress is not None:
@@ -84,8 +88,9 @@ class Bars:
         if here >= LEAST_DONE:
             left = f"; about {_duration((now - self._began) * (1.0 - done) / here)} left"
         log.info(
-            "%d of %d trainings done, %.0f%%%s", self._ended, len(self._share), 100.0 * done, left
-        )
+            "%d of %d %ss done, %.0f%%%s", self._ended, len(self._share), self._noun, 100.0 * done,
+            left,
+        )  # fmt: skip
 
 
 def _duration(seconds: float) -> str:
@@ -201,7 +206,32 @@ class _StageBar(Progress):
         yield from super().get_renderables()
 
 
-_CURRENT: ContextVar[_StageBar | None] = ContextVar("bar", default=None)
+class _Reported:
+    """Stages of a function in a child process: it draws nothing, and says the share done."""
+
+    def __init__(self, seconds: Mapping[str, float], report: Callable[[float], None]) -> None:
+        self._schedule, self._report = Schedule(seconds, time.monotonic()), report
+
+    def reach(self, stage: str) -> None:
+        now = time.monotonic()
+        self._schedule.reach(stage, now)
+        self._report(self._schedule.at(now)[0])
+
+
+_CURRENT: ContextVar[_StageBar | _Reported | None] = ContextVar("bar", default=None)
+
+
+@contextmanager
+def reported(seconds: Mapping[str, float], report: Callable[[float], None]) -> Iterator[None]:
+    """In a child process, where a function is `staged`: no bar, and at each stage the share done.
+
+    seconds   stage → how long it takes, as of `staged`
+    """
+    token = _CURRENT.set(_Reported(seconds, report))
+    try:
+        yield
+    finally:
+        _CURRENT.reset(token)
 
 
 def drawable() -> bool:

@@ -21,7 +21,7 @@ from shiplog.machine import child
 from shiplog.machine.unexpected import unexpected
 
 REPORT_INTERVAL_S = 0.5  # between two reports of a worker
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NPROC")
 
 Report = Callable[[float], None]
 
