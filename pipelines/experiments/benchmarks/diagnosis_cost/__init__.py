@@ -1,0 +1,1 @@
+"""What physics and diagnosis cost, beside another build of shiplog and beside CasADi."""
