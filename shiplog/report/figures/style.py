@@ -88,8 +88,16 @@ def svg(figure: Figure, prefix: str) -> str:
     """
     made = io.StringIO()
     with styled():
+        arrange(figure)
         figure.savefig(made, format="svg", metadata={"Date": None, "Creator": None})
     return inline(made.getvalue(), prefix)
+
+
+def arrange(figure: Figure) -> None:
+    """Lay it out, once: matplotlib would do so in a drawing before the drawing."""
+    if (engine := figure.get_layout_engine()) is not None:
+        engine.execute(figure)
+        figure.set_layout_engine(None)
 
 
 def inline(text: str, prefix: str) -> str:
@@ -119,6 +127,7 @@ def write(figure: Figure, path: Path) -> list[Path]:
     """PATH.svg, PATH.pdf and PATH.png, each whole or not at all."""
     made = []
     with styled():
+        arrange(figure)
         for kind in KINDS:
             facts = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind, {})
             to = path.with_name(f"{path.name}.{kind}")
