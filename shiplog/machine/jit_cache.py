@@ -19,7 +19,6 @@ import logging
 import threading
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import fields, is_dataclass
 from typing import Any
 
 import jax
@@ -28,9 +27,10 @@ from jax import export
 from jax.core import Tracer
 from jax.experimental.compilation_cache import compilation_cache
 
-from shiplog.machine import disk_cache, files
+from shiplog.machine import disk_cache, files, trees
 
 log = logging.getLogger(__name__)
+trees.tell_jax()
 
 # The emitters of fused loops need twice the time to compile a ship's derivatives, and what they
 # compile is no faster. Measured with `python -m pipelines.experiments.benchmarks.compiling`.
@@ -99,7 +99,7 @@ class Traced:
         self._known: dict[Hashable, Callable] = {}
 
     def __call__(self, *arguments: Any, **static: Hashable) -> Any:
-        leaves, tree = jax.tree.flatten(arguments)
+        leaves, tree = trees.flatten(arguments)
         if any(isinstance(leaf, Tracer) for leaf in leaves):
             return self._function(*arguments, **static)  # within what is traced itself
         leaves = [leaf if hasattr(leaf, "dtype") else np.asarray(leaf) for leaf in leaves]
@@ -118,9 +118,9 @@ class Traced:
         self, tree: Any, leaves: list, static: Mapping[str, Hashable], key: str
     ) -> Callable:
         def flat(*given: Any) -> Any:
-            return self._function(*jax.tree.unflatten(tree, given), **static)
+            return self._function(*trees.unflatten(tree, given), **static)
 
-        if not own(tree):
+        if not trees.ours(tree):
             return jax.jit(flat, compiler_options=COMPILER)
         name = f"{self._function.__module__}.{self._function.__qualname__}"
         digest = hashlib.sha256(disk_cache.source() + f"{jax.__version__} {name} {key}".encode())
@@ -147,24 +147,3 @@ def _keep(kept: Any, found: export.Exported) -> None:
             partial.write_bytes(found.serialize())
     except OSError as error:
         log.info("not kept: %s", error)
-
-
-def own(tree: Any) -> bool:
-    """Whether all that is static in a tree of arguments is of this program: then its `repr` and
-    the source say what it does."""
-    node = tree.node_data()
-    if node is None:
-        return True
-    kind, static = node
-    return _ours(kind) and _all_ours(static) and all(own(child) for child in tree.children())
-
-
-def _all_ours(static: Any) -> bool:
-    if isinstance(static, tuple | list):
-        return all(_all_ours(one) for one in static)
-    inner = [getattr(static, f.name) for f in fields(static)] if is_dataclass(static) else []
-    return _ours(type(static)) and _all_ours(inner)
-
-
-def _ours(kind: type) -> bool:
-    return kind.__module__.split(".")[0] in ("builtins", "shiplog")

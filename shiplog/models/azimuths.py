@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
 
+from shiplog.machine.arrays import Array, put
 from shiplog.nomenclature.frames import wrap
 
 
@@ -19,5 +18,5 @@ def within_a_turn(actuator: Array, turning: Sequence[int]) -> Array:
     """
     if not turning:
         return actuator
-    actuator, columns = jnp.asarray(actuator), np.array(turning)
-    return actuator.at[..., columns].set(wrap(actuator[..., columns]))
+    columns = np.array(turning)
+    return put(actuator, columns, wrap(actuator[..., columns]))

@@ -8,14 +8,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
 
+from shiplog.machine import trees
+from shiplog.machine.arrays import Array, jnp
 from shiplog.models.azimuths import within_a_turn
 from shiplog.models.mmg.wind import apparent
 
@@ -26,10 +24,9 @@ FEATURES = 300
 KERNEL_WIDTH = 2.0  # no voyage covers all combinations of many inputs: data of few serve best so
 
 
-@partial(
-    jax.tree_util.register_dataclass,
-    data_fields=["weights", "mean", "std", "out_mean", "out_std", "frequency", "phase", "bent"],
-    meta_fields=["wind", "components", "input_tanh", "turning"],
+@trees.tree(
+    data=["weights", "mean", "std", "out_mean", "out_std", "frequency", "phase", "bent"],
+    fixed=["wind", "components", "input_tanh", "turning"],
 )
 @dataclass(frozen=True)
 class Network:

@@ -8,24 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
 
+from shiplog.machine import trees
+from shiplog.machine.arrays import Array, jnp, numbers
 from shiplog.models.causes.base import Cause
 from shiplog.models.mmg import body
 from shiplog.models.mmg.model import MMG, named, total
 from shiplog.nomenclature.frames import in_body_axes
 
 
-@partial(
-    jax.tree_util.register_dataclass,
-    data_fields=["base", "constants", "stand_in", "stand_in_values"],
-    meta_fields=["causes"],
+@trees.tree(
+    data=["base", "constants", "stand_in", "stand_in_values"],
+    fixed=["causes"],
 )
 @dataclass(frozen=True)
 class Extended:
@@ -74,9 +71,9 @@ class Extended:
     def numbers(self, theta: Array) -> list[tuple[Array, ...]]:
         """Of each cause."""
         at, found = len(self.base.names), []
-        parts = jax.lax.split(theta, [1] * len(theta))
+        parts = numbers(theta, len(theta))
         for cause in self.causes:
-            found.append(tuple(part[0] for part in parts[at : at + cause.count]))
+            found.append(tuple(parts[at : at + cause.count]))
             at += cause.count
         return found
 

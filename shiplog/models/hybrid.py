@@ -7,13 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
 
+from shiplog.machine import trees
+from shiplog.machine.arrays import Array, jnp
 from shiplog.models import mmg
 from shiplog.models.azimuths import within_a_turn
 from shiplog.models.mmg import body
@@ -26,10 +24,9 @@ ANCHORS = 200  # training samples that stand for all of them in the distance
 FADE_LIMITS = 2.0  # limits of the coverage figure beyond the training data, where nothing is left
 
 
-@partial(
-    jax.tree_util.register_dataclass,
-    data_fields=["mean", "std", "bound", "anchors", "radius", "limit"],
-    meta_fields=["width"],
+@trees.tree(
+    data=["mean", "std", "bound", "anchors", "radius", "limit"],
+    fixed=["width"],
 )
 @dataclass(frozen=True)
 class Residual:
@@ -71,7 +68,7 @@ class Residual:
         return sum(int(np.prod(shape)) for shape in self.shapes.values())
 
 
-@partial(jax.tree_util.register_dataclass, data_fields=["physics", "residual"], meta_fields=[])
+@trees.tree(data=["physics", "residual"])
 @dataclass(frozen=True)
 class Hybrid:
     """The MMG and a residual network in one rollout; θ is the MMG's, then the weights."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import polars as pl
 
-from shiplog.machine.jit_cache import traced
 from shiplog.nomenclature.channels import STATE
 from shiplog.ship_profile.profile import Profile
 from shiplog.simulation.sensitivities import Simulator
@@ -23,7 +22,9 @@ def break_down(simulator: Simulator, seconds: pl.DataFrame, profile: Profile) ->
         blowing = true_wind(state, seconds.select(profile.wind_names).to_numpy())
     else:
         blowing = np.zeros((seconds.height, 2))
-    found = _parts(simulator.model, simulator.theta, state, actuator, blowing)
+    with np.errstate(all="ignore"):
+        parts = simulator.model.forces(simulator.theta, state, actuator, blowing)
+    found = {name: np.asarray(force) for name, force in parts.items()}
     found["total"] = sum(found.values())
     index = seconds.select("voyage", pl.col("elapsed").alias("time"))
     tables = []
@@ -31,8 +32,3 @@ def break_down(simulator: Simulator, seconds: pl.DataFrame, profile: Profile) ->
         columns = {axis: values[:, i] for i, axis in enumerate(("surge", "sway", "yaw"))}
         tables.append(index.with_columns(pl.lit(name).alias("part")).hstack(pl.DataFrame(columns)))
     return pl.concat(tables)
-
-
-@traced
-def _parts(model, theta, state, actuator, wind):
-    return model.forces(theta, state, actuator, wind)

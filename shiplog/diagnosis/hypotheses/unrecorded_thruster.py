@@ -21,7 +21,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-import jax.numpy as jnp
 import numpy as np
 from scipy.optimize import minimize
 
@@ -30,7 +29,6 @@ from shiplog.diagnosis.noise.on_off import Course
 from shiplog.diagnosis.noise.raised_noise import Residual, raise_channels
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, Remainder
 from shiplog.diagnosis.nominal.nominal_reference import Reference
-from shiplog.machine.jit_cache import traced
 from shiplog.models.mmg import MMG, body
 
 REACH_LENGTHS = 0.5  # ship lengths from midship: a force acts on the ship
@@ -184,10 +182,5 @@ class _Likelihood:
 
 def accelerations(ship: MMG, coefficients: Mapping, force: np.ndarray) -> np.ndarray:
     """ν̇ [n, 3] that forces X, Y, N [n, 3] make of a ship at rest."""
-    return np.asarray(_accelerations(ship, dict(coefficients), force))
-
-
-@traced
-def _accelerations(ship, coefficients, force):
-    zero = jnp.zeros(())
+    zero = np.zeros(())
     return body.accelerations(coefficients, ship.geometry, zero, zero, zero, force)

@@ -20,7 +20,7 @@ import numpy as np
 from shiplog.diagnosis.linear import segments
 from shiplog.diagnosis.linear.parameter_layout import Columns
 from shiplog.diagnosis.linear.segments import Cut
-from shiplog.machine.jit_cache import double
+from shiplog.machine.arrays import double
 from shiplog.models.causes import Cause, Setting
 from shiplog.models.extended import Extended
 from shiplog.voyages.rows.recording import Record

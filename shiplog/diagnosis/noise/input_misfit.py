@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import jax.numpy as jnp
 import numpy as np
 
 from shiplog.diagnosis.linear import segment_nodes
@@ -20,7 +19,6 @@ from shiplog.diagnosis.linear.segment_nodes import Nodes
 from shiplog.diagnosis.linear.segments import Cut, SegmentGrid
 from shiplog.diagnosis.noise import part_products
 from shiplog.diagnosis.noise.likelihood import ProcessNoise
-from shiplog.machine.jit_cache import double
 from shiplog.models.compiled_network import Network
 
 INPUT_SIZES = (1.0, 3.0, 9.0, 27.0)  # of the accelerations, in units of the ordinary process noise
@@ -87,8 +85,7 @@ def estimate(
 def _features(network: Network, nodes: Nodes) -> np.ndarray:
     """φ [S, J, F] of the network at the nodes."""
     actuator, wind = nodes.driven[..., :-3], nodes.driven[..., -2:]
-    with double():
-        return np.asarray(network.features(*map(jnp.asarray, (nodes.state, actuator, wind))))
+    return np.asarray(network.features(nodes.state, actuator, wind))
 
 
 def _likelihood(total: np.ndarray, known: np.ndarray, size: float) -> float:

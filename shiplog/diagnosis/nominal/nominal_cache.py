@@ -13,8 +13,6 @@ from collections.abc import Iterable
 from dataclasses import astuple
 from pathlib import Path as File
 
-import jax
-import numba
 import numpy as np
 import scipy
 
@@ -24,7 +22,7 @@ from shiplog.diagnosis.noise.likelihood import ProcessNoise
 from shiplog.diagnosis.nominal import campaign_characteristics, nominal_fit
 from shiplog.diagnosis.nominal.campaign_characteristics import Characteristics
 from shiplog.diagnosis.nominal.nominal_fit import Converged
-from shiplog.machine import disk_cache, files
+from shiplog.machine import disk_cache, files, trees
 from shiplog.models.causes import Setting
 from shiplog.models.extended import Extended
 from shiplog.models.starting_values import Start
@@ -34,7 +32,7 @@ PROCESS_NOISE = ("noise", "acceleration", "start", "coloured", "fade")
 # Field → its name in the file.
 TIME_FIELDS = {"time": "time", "bin": "bin", "node_step": "knot",
                "intermittent_time": "intermittent_time"}  # fmt: skip
-LIBRARIES = (jax, numba, np, scipy)
+LIBRARIES = (np, scipy)
 
 log = logging.getLogger(__name__)
 
@@ -123,7 +121,7 @@ def _keep(kept: File, arrays: dict) -> None:
 
 
 def _key(model: Extended, setting: Setting, start: Start, record: Record) -> str:
-    leaves, shape = jax.tree.flatten(model)
+    leaves, shape = trees.flatten(model)
     digest = hashlib.sha256(disk_cache.source())
     versions = [(library.__name__, library.__version__) for library in LIBRARIES]
     for word in (

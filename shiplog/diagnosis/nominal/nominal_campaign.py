@@ -30,7 +30,7 @@ from shiplog.diagnosis.nominal.campaign_prior import prior
 from shiplog.diagnosis.nominal.nominal_fit import Converged
 from shiplog.diagnosis.nominal.nominal_reference import Reference
 from shiplog.diagnosis.nominal.voyage_effects import VoyageEffects, reduced
-from shiplog.machine.jit_cache import double
+from shiplog.machine.arrays import double
 from shiplog.models.causes import Setting
 from shiplog.models.compiled_network import Network
 from shiplog.models.extended import Extended

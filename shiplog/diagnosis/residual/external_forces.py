@@ -18,7 +18,6 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-import jax.numpy as jnp
 import numpy as np
 
 from shiplog.diagnosis import thresholds
@@ -26,7 +25,6 @@ from shiplog.diagnosis.linear.linear_segments import Linear
 from shiplog.diagnosis.noise import residual_acceleration
 from shiplog.diagnosis.noise.likelihood import ProcessNoise
 from shiplog.diagnosis.noise.residual_acceleration import Unexplained
-from shiplog.machine.jit_cache import traced
 from shiplog.models.mmg import MMG, body
 from shiplog.models.mmg import wind as air
 from shiplog.models.mmg.model import named
@@ -178,9 +176,9 @@ def balance(
     own += np.where(_resting(record, physics, rows), RESTING, 1.0)[:, None] * full
     if physics.geometry.wind:
         angle = np.linspace(0.0, 2.0 * math.pi, 73)
-        worst = np.abs(np.asarray(_wind_force(physics, values, np.cos(angle), np.sin(angle)))).max(
-            0
-        )
+        worst = np.abs(
+            air.wind(named(physics.names, values), physics.geometry, np.cos(angle), np.sin(angle))
+        ).max(0)
         speed = np.linalg.norm(residual_acceleration.means_about(record, record.wind, rows), axis=1)
         own += (GUST * speed[:, None]) ** 2 * worst
     return Balance(rows, F, sd_F, own, misfit, full)
@@ -189,18 +187,7 @@ def balance(
 def masses(physics: MMG, values: np.ndarray) -> np.ndarray:
     """Mᵀ [3, 3]: force X, Y, N [N, N, N m] that 1 m/s² of surge, of sway and 1 rad/s² take, one a
     row."""
-    return np.asarray(_masses(physics, values))
-
-
-@traced
-def _masses(physics, values):
-    """Forces of unit accelerations, (X, Y, N) = M (u̇, v̇, ṙ), one a row."""
-    return body.forces_of(named(physics.names, values), physics.geometry, jnp.eye(3))
-
-
-@traced
-def _wind_force(physics, values, ahead, starboard):
-    return air.wind(named(physics.names, values), physics.geometry, ahead, starboard)
+    return body.forces_of(named(physics.names, values), physics.geometry, np.eye(3))
 
 
 def largest_own_forces(record: Record, physics: MMG, values: np.ndarray) -> np.ndarray:
@@ -232,15 +219,8 @@ def _forces(
     physics: MMG, values: np.ndarray, state: np.ndarray, actuator: np.ndarray
 ) -> dict[str, np.ndarray]:
     """Parts of MMG.forces [n, 3] in calm air."""
-    size = 1 << (len(state) - 1).bit_length()  # of few sizes, so that few are compiled
-    padded = (np.resize(v, (size, v.shape[1])) for v in (state, actuator))
-    found = _compiled(physics, values, *padded, np.zeros((size, 2)))
-    return {name: np.asarray(force)[: len(state)] for name, force in found.items()}
-
-
-@traced
-def _compiled(physics, values, state, actuator, wind):
-    return physics.forces(values, state, actuator, wind)
+    with np.errstate(all="ignore"):
+        return physics.forces(values, state, actuator, np.zeros((len(state), 2)))
 
 
 def _ranges(record: Record) -> list[np.ndarray]:

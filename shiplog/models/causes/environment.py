@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 
+from shiplog.machine.arrays import jnp
 from shiplog.models.causes.base import (
     FORM_DEVIATIONS,
     Cause,

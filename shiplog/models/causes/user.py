@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from shiplog.exceptions import RunError
-from shiplog.machine.jit_cache import double
 from shiplog.machine.paths import check_causes
 from shiplog.models.causes import CATALOGUE, Cause
 
@@ -37,6 +36,8 @@ def load(paths: Sequence[Path]) -> tuple[Cause, ...]:
 
 def _of(path: Path) -> list[Cause]:
     check_causes([path])
+    from shiplog.machine.jit_cache import double
+
     name = f"shiplog_user_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None and spec.loader is not None

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import jax.numpy as jnp
-from jax import Array
-
+from shiplog.machine.arrays import Array, jnp
 from shiplog.models.mmg.geometry import Geometry
 
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
 
+from shiplog.machine.arrays import Array, jnp
 from shiplog.models.mmg.estimate import GRAVITY
 from shiplog.models.mmg.geometry import Geometry
 from shiplog.models.mmg.safe_root import speed

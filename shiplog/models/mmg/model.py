@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from functools import reduce
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
 
+from shiplog.machine import trees
+from shiplog.machine.arrays import Array, jnp, numbers
 from shiplog.models.mmg import body, hull, parameters, propeller, rudder, thruster, wind
 from shiplog.models.mmg.geometry import Geometry, joined, split
 
@@ -97,17 +96,12 @@ def _whole(fixed: tuple[Geometry, int], numbers: Iterable[Any]) -> MMG:
     return MMG(joined(geometry, iter(numbers)), substeps)
 
 
-jax.tree_util.register_pytree_node(MMG, _flat, _whole)
+trees.register(MMG, _flat, _whole)
 
 
 def named(names: Sequence[str], theta: Array) -> dict[str, Array]:
-    """θ [P] as name → number.
-
-    Split, not indexed: reverse mode adds up a whole vector for every index, P² work for P numbers.
-    """
-    return dict(
-        zip(names, (part[0] for part in jax.lax.split(theta, [1] * len(names))), strict=True)
-    )
+    """θ [P] as name → number."""
+    return dict(zip(names, numbers(theta, len(names)), strict=True))
 
 
 def total(forces: Iterable[Array]) -> Array:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
 
+from shiplog.machine.arrays import Array, jnp
 from shiplog.models.mmg.geometry import Geometry, Propeller
 from shiplog.models.mmg.safe_root import speed
 

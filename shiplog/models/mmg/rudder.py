@@ -5,9 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import jax.numpy as jnp
-from jax import Array
-
+from shiplog.machine.arrays import Array, jnp
 from shiplog.models.mmg.geometry import Geometry, Propeller, Rudder
 from shiplog.models.mmg.propeller import slipstream
 from shiplog.models.mmg.safe_root import root

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import jax.numpy as jnp
-from jax import Array
+from shiplog.machine.arrays import Array, jnp
 
 STANDSTILL = 1e-12  # m²/s²: below, the ship stands
 

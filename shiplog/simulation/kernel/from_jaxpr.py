@@ -15,17 +15,13 @@ import jax
 import numpy as np
 from jax import Array
 
-from shiplog.simulation.kernel.graph import Graph
+from shiplog.simulation.kernel.graph import Graph, UnknownOperation
 
 Nodes = np.ndarray  # of integers: nodes of the graph, in the array's shape
 
 # Of so many nodes the code takes longer to make than it saves: a wide network has kernels of its
 # own, and its model is JAX's.
 MOST_NODES = 10_000
-
-
-class UnknownOperation(Exception):
-    """An operation of a model's that no code is made of; says its name."""
 
 
 class Reader:

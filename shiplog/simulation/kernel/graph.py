@@ -37,6 +37,10 @@ KNOWN: dict[str, Callable] = {
 }  # fmt: skip
 
 
+class UnknownOperation(Exception):
+    """An operation of a model's that no code is made of; says its name."""
+
+
 class Graph:
     """Nodes are integers. `nodes[i]` is (operation, operands …): an operand is an earlier node;
     those of "const", "truth", "varying" and "fixed" are the number, the truth value, and the

@@ -18,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from shiplog.simulation.kernel import machine_code
+from shiplog.machine import trees
+from shiplog.simulation.kernel import graph, machine_code
 from shiplog.simulation.kernel.machine_code import Level, Library
 
 log = logging.getLogger(__name__)
@@ -49,7 +50,7 @@ class Kernel:
 
     def prepared(self, model: Any, theta: np.ndarray) -> np.ndarray:
         """What depends on coefficients and sizes alone."""
-        fixed = np.concatenate([*(np.ravel(x) for x in _leaves(model)), np.ravel(theta)])
+        fixed = np.concatenate([*(np.ravel(x) for x in trees.flatten(model)[0]), np.ravel(theta)])
         fixed = np.ascontiguousarray(fixed, dtype=float)
         found = np.empty(max(self.constants, 1))
         self.functions["prepare"](pointer(fixed), pointer(found))
@@ -79,7 +80,8 @@ def kernel(model: Any, purpose: Purpose, driven: int, coefficients: int) -> Kern
     level = machine_code.level()
     if level is None:
         return None
-    kind = _kind(model)
+    leaves, structure = trees.flatten(model)
+    kind = structure, tuple(np.shape(leaf) for leaf in leaves)
     key = (*kind, purpose.name, driven, coefficients, level.name)
     if key not in _known:
         _known[key] = _made(model, kind, purpose, driven, coefficients, level)
@@ -107,34 +109,19 @@ def plain(name: str, write: Callable[[Any], None], signatures: Sequence[tuple[st
     return _known[key]
 
 
-def _leaves(model: Any) -> list[Any]:
-    import jax
-
-    return jax.tree.leaves(model)
-
-
-def _kind(model: Any) -> tuple[Any, ...]:
-    import jax
-
-    leaves, tree = jax.tree.flatten(model)
-    return tree, tuple(np.shape(leaf) for leaf in leaves)
-
-
 def _made(
     model: Any, kind: tuple, purpose: Purpose, driven: int, coefficients: int, level: Level
 ) -> Kernel | None:
-    from shiplog.machine.jit_cache import own
-    from shiplog.simulation.kernel.from_jaxpr import UnknownOperation
-
-    tree, shapes = kind
+    structure, shapes = kind
     whose = machine_code.whose(level)
-    key = f"{whose} {purpose.name} {driven} {coefficients} {shapes} {tree!r}" if own(tree) else None
+    key = f"{whose} {purpose.name} {driven} {coefficients} {shapes} {structure!r}"
+    key = key if trees.ours(structure) else None
     found = machine_code.kept(key) if key else None
     if found is None:
         begin = time.process_time()
         try:
             text, constants = written(model, purpose, driven, coefficients, level.lanes)
-        except UnknownOperation as error:
+        except graph.UnknownOperation as error:
             _refuse(type(model).__name__, str(error))
             return None
         # what others wrote is known by the code that was made of it
@@ -164,14 +151,13 @@ def written(
     """LLVM's assembly of a kernel, and how many constants it hoists. Raises UnknownOperation."""
     from shiplog.simulation.kernel.elementary import lowered
     from shiplog.simulation.kernel.functions import Functions
-    from shiplog.simulation.kernel.graph import Graph
     from shiplog.simulation.kernel.writer import Module
 
-    whole = Graph()
+    whole = graph.Graph()
     outputs = {
         name: equations(whole, model, driven, coefficients, by) for name, by in purpose.functions
     }
-    plain, module = Graph(), Module(lanes)
+    plain, module = graph.Graph(), Module(lanes)
     flat = lowered(whole, [node for nodes in outputs.values() for node in nodes], plain)
     functions, sizes, at = Functions(module, plain), {}, 0
     for name, by in purpose.functions:
@@ -192,47 +178,45 @@ def _sizes(driven: int, coefficients: int, zeros: frozenset[int], by: str):
     return Sizes(driven, coefficients if by in ("all", "state and θ") else 0, columns, zeros)
 
 
-def equations(graph: Any, model: Any, driven: int, coefficients: int, by: str) -> list[int]:
-    """Outputs of a function in `graph`: ν̇, cos ψ, sin ψ and the derivatives asked for."""
+def equations(g: graph.Graph, model: Any, driven: int, coefficients: int, by: str) -> list[int]:
+    """Outputs of a function in the graph: ν̇, cos ψ, sin ψ and the derivatives asked for."""
     from shiplog.simulation.kernel.derivatives import gradients
     from shiplog.simulation.kernel.windows import STATES
 
-    found, x, theta = traced(graph, model, driven, coefficients)
+    found, x, theta = traced(g, model, driven, coefficients)
     heading = x[4]
-    outputs = [*found, graph.apply("cos", heading), graph.apply("sin", heading)]
+    outputs = [*found, g.apply("cos", heading), g.apply("sin", heading)]
     if not by:
         return outputs
     moving = x if by == "all" else x[:STATES]
     last = [] if by == "state" else theta
-    rows = gradients(graph, found, [*moving, *last])
+    rows = gradients(g, found, [*moving, *last])
     outputs += [node for row in rows for node in row[: len(moving)]]
     return outputs + [node for row in rows for node in row[len(moving) :]]
 
 
 def traced(
-    graph: Any, model: Any, driven: int, coefficients: int
+    g: graph.Graph, model: Any, driven: int, coefficients: int
 ) -> tuple[list[int], list[int], list[int]]:
     """ν̇ [3] in the graph, its varying inputs (state, actuators, wind) and the coefficients."""
-    import jax
-
     from shiplog.simulation.kernel import from_jaxpr
     from shiplog.simulation.kernel.windows import STATES
 
-    leaves, tree = jax.tree.flatten(model)
+    leaves, structure = trees.flatten(model)
     shapes = [np.shape(leaf) for leaf in leaves]
 
     def acceleration(theta, state, actuator, wind, *numbers):
-        return jax.tree.unflatten(tree, numbers).acceleration(theta, state, actuator, wind)
+        return trees.unflatten(structure, numbers).acceleration(theta, state, actuator, wind)
 
     actuators = driven - 2
     closed = from_jaxpr.trace(
         acceleration, (coefficients,), (STATES,), (actuators,), (2,), *shapes
     )  # fmt: skip
-    x = [graph.varying(i) for i in range(STATES + driven)]
+    x = [g.varying(i) for i in range(STATES + driven)]
     given, at = [], 0
     for shape in (*shapes, (coefficients,)):
         size = int(np.prod(shape))
-        nodes = [graph.fixed(at + i) for i in range(size)]
+        nodes = [g.fixed(at + i) for i in range(size)]
         given.append(np.array(nodes, dtype=np.int64).reshape(shape))
         at += size
     *numbers, theta = given
@@ -240,7 +224,7 @@ def traced(
         np.array(part, dtype=np.int64)
         for part in (x[:STATES], x[STATES : STATES + actuators], x[STATES + actuators :])
     )
-    (found,) = from_jaxpr.Reader(graph).read(closed, [theta, state, actuator, wind, *numbers])
+    (found,) = from_jaxpr.Reader(g).read(closed, [theta, state, actuator, wind, *numbers])
     return [int(node) for node in found.ravel()], x, [int(node) for node in theta]
 
 
