@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from shiplog.machine import disk_cache
+from shiplog.machine import disk_cache, trees
 from shiplog.machine.jit_cache import Traced
 from shiplog.models.causes import CATALOGUE
 from shiplog.models.causes.environment import Current
@@ -86,7 +86,7 @@ class Tide(Current):
     """Likewise, of a cause of the user's own."""
 
 
-@jax.tree_util.register_static
+@trees.tree((), ["causes"])
 @dataclass(frozen=True)
 class Held:
     causes: tuple

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import jax
 import numpy as np
 import pytest
 from toy_ship import RECORD, SETTING, THETA, Toy
@@ -39,7 +38,7 @@ def test_another_input_has_another_key(changed):
 def test_another_program_or_library_has_another_key(monkeypatch):
     before = key()
     with monkeypatch.context() as patch:
-        patch.setattr(jax, "__version__", "0.0.1")
+        patch.setattr(np, "__version__", "0.0.1")
         assert key() != before
     monkeypatch.setattr(disk_cache, "source", lambda: b"another")
     assert key() != before
