@@ -14,7 +14,7 @@ from straight import CAUSES, PROCESS_NOISE
 from shiplog.diagnosis.hypotheses import evidence, fits, weighing
 from shiplog.diagnosis.noise import remainder
 from shiplog.diagnosis.noise.discrepancy import EVEN
-from shiplog.diagnosis.noise.remainder import INTERMITTENT, RAISED, Remainder
+from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
 from shiplog.diagnosis.trial.fitted import Fit
 
 # --- changes
@@ -209,3 +209,51 @@ def test_a_fit_that_diverges_with_raised_noise_leaves_no_noise_to_explain(
     assert count >= failing
     assert np.isfinite(table.found[("drag",), RAISED].evidence)
     assert (("drag",), INTERMITTENT) not in table.found
+
+
+@pytest.mark.parametrize("kind", (NOMINAL, RAISED))
+@pytest.mark.parametrize("more", (0.0, 3.0))
+def test_evidence_is_that_of_the_best_of_a_fine_grid_of_noise_levels(made, kind, more):
+    """Levels are eight per cent apart: the value is that of the parabola's top, and with two levels
+    and the bend of another hypothesis it is nearly that."""
+    nominal, record, _ = made
+    plain = straight.trial(*made)
+    kernel = np.linalg.cholesky(PROCESS_NOISE.kernel(plain.grid.nodes))
+    rng = np.random.default_rng(8)
+    drawn = math.sqrt(more) * rng.standard_normal((8, 3 * plain.grid.nodes)) @ kernel.T
+    given = straight.passed(
+        record, straight.columns_of(CAUSES), seed=2, sensitivity=0.3, accelerations=drawn
+    )
+    trial, remaining = straight.trial(nominal, record, given), Remainder(kind)
+    point = trial.linearise({})
+    found, _ = evidence.scan(trial, point, (), remainder=remaining)
+    fine = np.exp(np.linspace(-0.12, 0.12, 49))
+    values = [
+        evidence.level(trial, point, found.noise_factor * by, (), remaining).value for by in fine
+    ]
+    assert 0 < int(np.argmax(values)) < 48
+    assert found.evidence == pytest.approx(max(values), abs=0.01)
+    at_level = evidence.level(trial, point, found.noise_factor, (), remaining).value
+    assert at_level <= found.evidence < at_level - found.bend / 8.0 + 0.01
+    again, _ = evidence.scan(
+        trial, point, (), (), found.noise_factor, remaining, bend=0.95 * found.bend
+    )
+    assert again.evidence == pytest.approx(max(values), abs=0.1)
+
+
+def test_the_top_of_a_parabola_by_hand():
+    """Of -(x - 0.3)² steps: between levels, from one side with three levels, and from two levels
+    with its bend; of levels far apart the best is all that is known."""
+    step = evidence.FINE_STEP
+
+    def of(*powers, bend=0.0):
+        values = [-((x - 0.3) ** 2) for x in powers]
+        return evidence.top_of([step**x for x in powers], values, bend)
+
+    for given in (of(1, 0, -1, 7), of(0, 1, 2), of(0, 1, bend=-2.0)):
+        place, gain, bend = given
+        assert gain == pytest.approx(0.09, abs=1e-9) and bend == pytest.approx(-2.0)
+        assert place == (1 if given == of(1, 0, -1, 7) else 0)
+    assert of(4, 0, 8) == (1, 0.0, 0.0)
+    _, gain, _ = of(5, 6, 7)  # the top is 4.7 steps away: one step is as far as it is trusted
+    assert gain == pytest.approx(4.7**2 - 3.7**2)

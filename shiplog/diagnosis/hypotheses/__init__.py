@@ -34,7 +34,15 @@ their normal matrix is a Schur complement:
     y = Xᵀ S⁻¹ v = Xᵀ R⁻¹ r - Bᵀ A⁻¹ b                                                  (11)
     log Z(x) - log Z = ½ yᵀ (M + σ⁻² I)⁻¹ y - ½ log|I + σ² M|                           (12)
 
-The factor λ of the process noise is that of the largest log Z(λ) + log p(λ). Bounds on the numbers
+The factor λ of the process noise is that of the largest v(λ) = log Z(λ) + log p(λ). It is worked
+out at whole powers of a step, λ = 1.08ᵏ. The evidence is the top of the parabola through the best
+of them and its neighbours, v₋ and v₊:
+
+    max v ≈ v + s² / (-2b),   s = (v₊ - v₋) / 2,   b = v₊ - 2v + v₋
+
+b counts the observations (-b = 14 for two hours of a three-metre ship), so that the step alone
+would cost up to -b/8 nats. While a fit converges two levels give its slope, with the b of the
+round before; where it ends there are three. Bounds on the numbers
 of a cause add their probability after the data, over that before:
 
     log P(low ≤ x ≤ high | r) - log P(low ≤ x ≤ high)                                   (13)

@@ -106,11 +106,12 @@ def evaluate(
     last: _Iterate | None = None  # that was accepted
     best: _Iterate | None = None
     halvings, damping = 0, 1.0  # of a step; it grows back once steps are accepted
+    bend = 0.0  # of the evidence over log λ, once it is known
     steady = with_force  # whether the process noise has converged: a round then keeps it
     for _ in range(RELINEARISATIONS):
         try:
             point = trial.linearise(numbers, near, noise_factor, remainder)
-            base = _posterior(trial, point, included, remainder, lately, steady)
+            base = _posterior(trial, point, included, remainder, lately, steady, bend)
             if base.evidence < lowest:
                 if abs(math.log(base.noise_factor / noise_factor)) < STEADY:
                     raise np.linalg.LinAlgError("a step too far")
@@ -129,18 +130,18 @@ def evaluate(
             continue
         converged = here.converged(last, damping)
         settled = lately is not None and abs(math.log(base.noise_factor / lately)) < STEADY
-        kept, steady = steady, with_force or settled
+        steady = with_force or settled
         last, damping = here, damping if halvings else min(2.0 * damping, 1.0)
         halvings = 0
         if best is None or base.density >= best.base.density:
             best = here
-        near, noise_factor = point, base.noise_factor
+        near, noise_factor, bend = point, base.noise_factor, base.bend
         numbers = trial.clipped(_interpolated(base.numbers, point.numbers, damping))
         lately = noise_factor
         if not all(np.isfinite(values).all() for values in numbers.values()):
             return Fit(point, replace(base, name=name, evidence=-np.inf), remainder)
         if converged:
-            if kept and not with_force:
+            if not with_force:  # by three levels, whatever was enough on the way
                 base, _ = evidence.scan(trial, point, (), included, lately, remainder)
             return Fit(point, replace(base, name=name), remainder)
     if best is None:
@@ -160,15 +161,16 @@ def _length(point: Point, base: Estimate, included: Sequence[str]) -> float:
 
 def _posterior(
     trial: Trial, point: Point, included: Sequence[str], remainder: Remainder,
-    lately: float | None, steady: bool,
+    lately: float | None, steady: bool, bend: float,
 ) -> Estimate:  # fmt: skip
-    """The hypothesis at a point, over λ, or at the λ of the last round where that is steady.
-    Raises np.linalg.LinAlgError where the path diverged."""
+    """The hypothesis at a point, over λ, or at the λ of the last round where that is steady; with
+    the `bend` of the last round. Raises np.linalg.LinAlgError where the path diverged."""
     if np.abs(point.linear.e).max() > AWAY:
         raise np.linalg.LinAlgError("the path diverged")
     if steady and lately is not None:
         return evidence.fit(trial, point, included, lately, remainder)
-    return evidence.scan(trial, point, (), included, lately, remainder)[0]
+    known = 0.0 if lately is None else bend
+    return evidence.scan(trial, point, (), included, lately, remainder, known)[0]
 
 
 def _halved(

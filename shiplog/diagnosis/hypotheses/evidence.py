@@ -7,7 +7,7 @@ the change of weights of its remainder's family. A candidate is one cause in add
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,8 +20,10 @@ from shiplog.diagnosis.trial.fitted import Estimate, ExpectedEvidence, Level, Po
 from shiplog.diagnosis.trial.trial import Numbers, Trial
 from shiplog.models.causes import Cause
 
-NOISES = (0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 16.0)  # times the nominal
-FINE_STEP = 1.08  # step about the best of them
+FINE_STEP = 1.08  # of λ: its levels are whole powers of it, on one grid for all hypotheses
+NOISES = (-9, -5, -2, 0, 2, 4, 9, 13, 18, 22, 27, 36)  # powers tried first: λ of 0.5 to 16
+FARTHEST = 3  # steps to the top of a parabola from the best of its levels, at most
+MOST_MOVES = 6  # of the best level from three to others, at most
 LITTLE_NATS = 1.0  # gain of a step, too small to decide between hypotheses
 MOST_PATHS = 8  # of the model as it stands, one closer to the measurement than the other, at most
 NO_CHANGE_OF_NOISE = Remainder()
@@ -51,7 +53,7 @@ def begin(trial: Trial, numbers: Numbers) -> tuple[Trial, Point]:
 def robust(trial: Trial, point: Point) -> np.ndarray:
     """Weights [S] of the segments by their χ² at the posterior mean, A⁻¹ b (7). They are the same
     for every hypothesis: a few segments must not decide."""
-    best = max(levels(trial, point), key=lambda one: one.value)
+    best = top(levels(trial, point))
     ref = trial.reference
     d = best.mean[: len(ref.pull)] * ref.columns.unit
     left, d = trial.less_misfit(point.linear, d)
@@ -309,54 +311,117 @@ def _log_share_of_bounds(
 
 def levels(
     trial: Trial, point: Point, included: Sequence[str] = (), near: float | None = None,
-    remainder: Remainder = NO_CHANGE_OF_NOISE,
+    remainder: Remainder = NO_CHANGE_OF_NOISE, bend: float = 0.0,
 ) -> list[Level]:  # fmt: skip
-    """The base hypothesis at each λ that is tried: from 1 outwards while log Z(λ) + log p(λ) rises,
-    then finely about the best, at the top of the parabola through three of them.
+    """The base hypothesis at each λ = FINE_STEPᵏ that is tried: from 1 outwards while
+    log Z(λ) + log p(λ) rises, then at three about the best, which are moved towards the top of the
+    parabola through them until the best is the middle one. All hypotheses share one grid, since
+    the volume of each λ is that of the first point.
 
-    near   λ about which alone it is tried"""
-    tried: dict[float, Level] = {}
+    near   λ about which alone it is tried
+    bend   of the parabola, where it is known: two levels give its top"""
+    tried: dict[int, Level] = {}
 
-    def log_Z(noise: float) -> float:
-        if noise not in tried:
-            tried[noise] = level(trial, point, noise, included, remainder)
-        return tried[noise].value
+    def log_Z(power: int) -> float:
+        if power not in tried:
+            tried[power] = level(trial, point, FINE_STEP**power, included, remainder)
+        return tried[power].value
 
-    here = near
-    if here is None:
-        middle = NOISES.index(1.0)
-        best = middle
-        for way in (1, -1):
-            i = middle
-            while 0 <= i + way < len(NOISES) and log_Z(NOISES[i + way]) > log_Z(NOISES[i]):
-                i += way
-            if log_Z(NOISES[i]) > log_Z(NOISES[best]):
-                best = i
-            if best != middle:
-                break
-        here = NOISES[best]
-    below, at, above = log_Z(here / FINE_STEP), log_Z(here), log_Z(here * FINE_STEP)
-    bend = below - 2.0 * at + above
-    top = float(np.clip(0.5 * (below - above) / bend, -3.0, 3.0)) if bend < 0.0 else 0.0
-    if abs(top) > 1.0:  # of the parabola through them, and beyond them
-        log_Z(here * FINE_STEP**top)
+    here = _best_of_all(log_Z) if near is None else _power(near)
+    if bend < 0.0:
+        slope = log_Z(here + 1) - log_Z(here) - 0.5 * bend
+        away = -slope / bend
+        if -0.75 < away < 1.75:
+            return list(tried.values())
+        here += round(max(-FARTHEST, min(FARTHEST, away)))
+    for _ in range(MOST_MOVES):
+        below, at, above = (log_Z(here + way) for way in (-1, 0, 1))
+        if max(below, above) <= at:
+            break
+        curvature, step = below - 2.0 * at + above, math.copysign(1.0, above - below)
+        if curvature < 0.0:
+            step = 0.5 * (below - above) / curvature
+        here += round(max(-FARTHEST, min(FARTHEST, step))) or round(math.copysign(1.0, step))
     return list(tried.values())
+
+
+def _best_of_all(log_Z: Callable[[int], float]) -> int:
+    """The best of NOISES, from 1 outwards while the value rises."""
+    middle = NOISES.index(0)
+    best = middle
+    for way in (1, -1):
+        i = middle
+        while 0 <= i + way < len(NOISES) and log_Z(NOISES[i + way]) > log_Z(NOISES[i]):
+            i += way
+        if log_Z(NOISES[i]) > log_Z(NOISES[best]):
+            best = i
+        if best != middle:
+            break
+    return NOISES[best]
+
+
+def _power(noise: float) -> int:
+    """k of λ = FINE_STEPᵏ, the nearest one."""
+    return round(math.log(noise) / math.log(FINE_STEP))
+
+
+def enclosed(tried: Sequence[Level], noise: float) -> bool:
+    """Whether the levels on both sides of λ are among those that were tried."""
+    powers = {_power(one.noise_factor / noise) for one in tried}
+    return {-1, 1} <= powers
+
+
+def top(tried: Sequence[Level], bend: float = 0.0) -> Level:
+    """The best of some levels, with the value at the top of the parabola in log λ through it and
+    those about it: it is a step of FINE_STEP off at most, and a step may cost several nats."""
+    noises, values = [one.noise_factor for one in tried], [one.value for one in tried]
+    best, gain, bend = top_of(noises, values, bend)
+    return replace(tried[best], value=values[best] + gain, bend=bend)
+
+
+def top_of(
+    noises: Sequence[float], values: Sequence[float], bend: float = 0.0
+) -> tuple[int, float, float]:
+    """Place of the greatest of some values, what the top of the parabola through it and its
+    neighbours, one step away, is above it, and the parabola's second difference b. With
+    neighbours v₋ and v₊ of v the slope is s = (v₊ - v₋)/2, and the gain s²/(-2b), b = v₊ - 2v + v₋.
+
+    A maximum at the end of what was tried has the parabola through three levels on one side, its
+    top a step further at most. With two levels b is the given `bend`."""
+    best = max(range(len(values)), key=values.__getitem__)
+    powers = [_power(noise / noises[best]) for noise in noises]
+    at = dict(zip(powers, values, strict=True))
+    value = values[best]
+    if -1 in at and 1 in at:
+        slope, bend = 0.5 * (at[1] - at[-1]), at[1] - 2.0 * value + at[-1]
+    elif side := next((way for way in (-1, 1) if way in at), 0):
+        if 2 * side in at:
+            bend = at[2 * side] - 2.0 * at[side] + value
+        slope = side * (at[side] - value - 0.5 * bend)
+    else:
+        return best, 0.0, bend
+    if not bend < 0.0:
+        return best, 0.0, bend
+    away = max(-1.0, min(1.0, -slope / bend))
+    return best, max(slope * away + 0.5 * bend * away**2, 0.0), bend
 
 
 def scan(
     trial: Trial, point: Point, candidates: Sequence[Cause], included: Sequence[str] = (),
-    near: float | None = None, remainder: Remainder = NO_CHANGE_OF_NOISE,
+    near: float | None = None, remainder: Remainder = NO_CHANGE_OF_NOISE, bend: float = 0.0,
 ) -> tuple[Estimate, list[Estimate]]:  # fmt: skip
     """The base hypothesis at its most probable λ; and each candidate in addition to it, at its
-    own, with its log Bayes factor as its evidence, the greatest first."""
-    tried = levels(trial, point, included, near, remainder)
-    best = max(tried, key=lambda one: one.value)
+    own, with its log Bayes factor as its evidence, the greatest first. `bend` as `levels` has
+    it."""
+    tried = levels(trial, point, included, near, remainder, bend)
+    best = top(tried, bend)
+    noises = [one.noise_factor for one in tried]
     found = []  # a cause that explains makes the process noise fall: each level is tried
     for cause in candidates:
         each = [candidate(trial, one, cause.label) for one in tried]
-        found.append(max(each, key=lambda one: one.evidence))
-    over_base = [replace(one, evidence=one.evidence - best.value) for one in found]
-    return _estimate(trial, best, point, included), sorted(over_base, key=lambda one: -one.evidence)
+        at, gain, _ = top_of(noises, [one.evidence for one in each], bend)
+        found.append(replace(each[at], evidence=each[at].evidence + gain - best.value))
+    return _estimate(trial, best, point, included), sorted(found, key=lambda one: -one.evidence)
 
 
 def fit(
@@ -369,4 +434,6 @@ def fit(
 def _estimate(trial: Trial, one: Level, point: Point, included: Sequence[str]) -> Estimate:
     numbers, covariance = numbers_of(trial, one, point, included)
     density = log_density(trial, one, included)
-    return Estimate("nothing", one.value, one.noise_factor, numbers, covariance, density=density)
+    return Estimate(
+        "nothing", one.value, one.noise_factor, numbers, covariance, density=density, bend=one.bend
+    )

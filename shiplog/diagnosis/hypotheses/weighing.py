@@ -88,7 +88,7 @@ class Rough:
 
     @cached_property
     def best(self) -> Level:
-        return max(self.levels, key=lambda level: level.value)
+        return evidence.top(self.levels)
 
     @property
     def raises(self) -> bool:
@@ -170,7 +170,7 @@ def _plain(of: CauseSet, numbers: Mapping[str, np.ndarray], at: Point) -> Rough 
     if near is not None and near > RAISED_FROM:  # the noise may be nominal again
         levels.append(evidence.level(trial, point, 1.0, included, RAISING))
     nominal = best(trial, levels, NOMINAL).noise_factor
-    if abs(math.log(nominal)) > 2.0 * trial.nominal_spread:  # its prior favours the nominal noise
+    if not evidence.enclosed(levels, nominal):  # its prior favours the nominal noise
         levels += nominal_levels(trial, point, included, nominal)
     return Rough(of, point, RAISING, levels)
 
@@ -234,7 +234,7 @@ def best(trial: Trial, levels: Sequence[Level], kind: str) -> Level:
             replace(one, value=one.value - raised_over_nominal(trial, one.noise_factor))
             for one in levels
         ]  # fmt: skip
-    return max(levels, key=lambda level: level.value)
+    return evidence.top(levels)
 
 
 def raised_over_nominal(trial: Trial, noise: float) -> float:
@@ -266,9 +266,9 @@ def change(plain: Rough, rough: Rough, family: str) -> Change:
             found.append((level.value + gained, size, level.noise_factor))
         return found
 
-    nominal = [(v - raised_over_nominal(trial, noise), s, noise) for v, s, noise in tried(plain)]
-    noisy = max(nominal)[0] > plain.best.value
-    value, size, noise = max(tried(rough) if noisy else nominal)
+    nominal = _top([(v - raised_over_nominal(trial, n), size, n) for v, size, n in tried(plain)])
+    noisy = nominal[0] > plain.best.value
+    value, size, noise = _top(tried(rough)) if noisy else nominal
     least = rough.spectrum() if plain.of.spectrum else 0.0
     if plain.raises and value - rough.best.value < least:
         value = -math.inf
@@ -276,6 +276,13 @@ def change(plain: Rough, rough: Rough, family: str) -> Change:
         return Change(plain.point, Remainder(family, size), value, noise)
     remainder = replace(rough.remainder, kind=family, size=size, noisy=True)
     return Change(rough.point, remainder, value, noise)
+
+
+def _top(found: Sequence[tuple[float, float, float]]) -> tuple[float, float, float]:
+    """Of log evidence, size and λ at each level the best, its evidence at the parabola's top."""
+    values, sizes, noises = zip(*found, strict=True)
+    best, gain, _ = evidence.top_of(noises, values)
+    return values[best] + gain, sizes[best], noises[best]
 
 
 def _add_families(

@@ -22,6 +22,7 @@ class Estimate:
     numbers        of each cause, as a change from nominal, with their covariance
     density        of a base hypothesis the log density of the data and of the numbers where it was
                    linearised
+    bend           of the evidence over the logarithm of λ, as of `Level`
     expected       of a candidate: the log Bayes factor to expect of it, by its size
     """
 
@@ -32,6 +33,7 @@ class Estimate:
     covariance: np.ndarray | None = None
     expected: ExpectedEvidence | None = None
     density: float = -np.inf
+    bend: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -116,6 +118,8 @@ class Level:
     mean          [N]     μ + K v = A⁻¹ b
     value         log evidence
     share         of it, what the bounds of numbers add
+    bend          second difference of the log evidence over three levels, one step apart; zero of a
+                  level by itself
     """
 
     noise_factor: float
@@ -124,3 +128,4 @@ class Level:
     mean: np.ndarray
     value: float
     share: float = 0.0
+    bend: float = 0.0
