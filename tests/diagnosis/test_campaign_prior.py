@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
+from shiplog.diagnosis.nominal import campaign_prior
 from shiplog.diagnosis.nominal.campaign_prior import (
     INFORMATION_SHARES,
     learn,
@@ -118,3 +119,26 @@ def test_products_of_voyages_are_those_of_a_dense_covariance(apart):
         covariance = np.eye(len(both)) + np.asarray(j @ j.T) + shared @ shared.T
         assert gram == pytest.approx(both.T @ np.linalg.solve(covariance, both))
         assert volume == pytest.approx(np.linalg.slogdet(covariance)[1])
+
+
+def test_voyages_are_predicted_from_the_total_less_their_own(monkeypatch):
+    """As from a sum over the others, written out; one evaluation of the prior for each voyage,
+    spread and share."""
+    rng = np.random.default_rng(4)
+    rows = [rng.standard_normal((30, 6)) for _ in range(8)]
+    parts = [reduced(r.T @ r, np.full(5, 0.3))[0] for r in rows]
+    voyages, effects = np.repeat(np.arange(4), 2), VoyageEffects(np.full(5, 0.3), np.ones(5))
+    scores = []
+    for apart in campaign_prior.VOYAGE_SPREADS:
+        each, volumes = reduce_voyages(parts, voyages, apart * effects.deviation)
+        score = 0.0
+        for left in range(4):
+            kept = sum(one for i, one in enumerate(each) if i != left)
+            given = kept[1:, 1:] + np.eye(5), kept[1:, 0]
+            score += campaign_prior.marginal(each[left], *given) - 0.5 * volumes[left]
+        scores.append(score)
+    weight = np.exp(scores - np.logaddexp.reduce(scores))
+    monkeypatch.setattr(campaign_prior, "INFORMATION_SHARES", (1.0,))
+    apart, share = campaign_prior.learn(parts, voyages, effects, np.zeros(5))
+    assert share == 1.0
+    assert apart**2 == pytest.approx(weight @ np.square(campaign_prior.VOYAGE_SPREADS), rel=1e-9)

@@ -43,8 +43,11 @@ def prior(
     Raises np.linalg.LinAlgError where a matrix is singular.
     """
     G = share * sum(parts, np.zeros((len(known) + 1,) * 2))
-    V = np.linalg.inv(G[1:, 1:] + np.diag(known))
-    m = V @ (G[1:, 0] + anchor)
+    information, pull = G[1:, 1:] + np.diag(known), G[1:, 0] + anchor
+    if not deviation.any():
+        return information, pull
+    V = np.linalg.inv(information)
+    m = V @ pull
     Lambda = np.linalg.inv(V + np.diag(deviation**2))
     return Lambda, Lambda @ m
 
@@ -100,7 +103,8 @@ def learn(
         score(a, κ) = Σ_v log p(e_v | the other voyages; a, κ)      `marginal`, with `prior`
         κ = argmax log Σ_a exp score(a, κ),   a² = Σ_a p(a | κ) a²,  p(a | κ) ∝ exp score(a, κ)
 
-    over VOYAGE_SPREADS and INFORMATION_SHARES, from κ = 1 down while the sum grows. One voyage
+    over VOYAGE_SPREADS and INFORMATION_SHARES, from κ = 1 down while the sum grows. The others are
+    the total less one's own, so that it takes a time in proportion to the voyages. One voyage
     alone says nothing of this: all of `VOYAGE_SPREADS` stay as likely as before.
 
     parts   G [1 + C, 1 + C] of each part, its own numbers integrated out; `voyages` v of each
@@ -113,9 +117,9 @@ def learn(
     for share in INFORMATION_SHARES if count > 1 else ():
         scores = np.zeros(len(VOYAGE_SPREADS))
         for i, (each, volumes) in enumerate(tried):
-            for left, (gram, volume) in enumerate(zip(each, volumes, strict=True)):
-                kept = [g for j, g in enumerate(each) if j != left]
-                given = prior(kept, K, anchor, np.zeros(len(K)), share)
+            total = sum(each, np.zeros_like(each[0]))
+            for gram, volume in zip(each, volumes, strict=True):
+                given = prior([total - gram], K, anchor, np.zeros(len(K)), share)
                 scores[i] += marginal(gram, *given) - 0.5 * volume
         whole = float(np.logaddexp.reduce(scores))
         if whole < best:

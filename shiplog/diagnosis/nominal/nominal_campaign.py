@@ -77,6 +77,11 @@ class Campaign:
             campaign_prior.reduce_voyages(self.parts, self.voyage, self.apart * self.deviation)[0]
         )
 
+    @cached_property
+    def total(self) -> np.ndarray:
+        """Σ_v G_v of all voyages."""
+        return np.sum(self.voyages, axis=0)
+
     @property
     def deviation(self) -> np.ndarray:
         """D^½ [C + W] of one part's numbers; zero of the unseen families' weights."""
@@ -101,11 +106,10 @@ class Campaign:
     def prior_without(self, left_out: int, apart: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Λ [C, C] and η [C] (`campaign_prior.prior`), one nominal voyage left out; of the numbers
         of a voyage that is so far `apart`, a."""
-        K = self.effects.size**-2.0
-        count = 1 + len(K)
-        kept = [g[:count, :count] for i, g in enumerate(self.voyages) if i != left_out]
-        return prior(kept, K, self.reference.anchor, apart * self.effects.deviation,
-                     self.reference.counts)  # fmt: skip
+        K, ref = self.effects.size**-2.0, self.reference
+        others = self.total if left_out < 0 else self.total - self.voyages[left_out]
+        count, own = 1 + len(K), apart * self.effects.deviation
+        return prior([others[:count, :count]], K, ref.anchor, own, ref.counts)
 
 
 def learn(

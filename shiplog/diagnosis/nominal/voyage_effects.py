@@ -135,19 +135,25 @@ def learn(
 
 @dataclass(frozen=True)
 class _Part:
-    """M [C, C] and g [C] of a part; M_F [F, C] and g_F [F], their rows that have a b; M_FF."""
+    """Blocks of a part's G: M_FF, M_Fo, M_oo, g_F and g_o; F have a b, o have none."""
 
-    m: np.ndarray
-    g: np.ndarray
-    own: np.ndarray
-    own_g: np.ndarray
-    both: np.ndarray
+    ff: np.ndarray
+    fo: np.ndarray
+    oo: np.ndarray
+    g_f: np.ndarray
+    g_o: np.ndarray
 
     @classmethod
     def select(cls, gram: np.ndarray, free: np.ndarray) -> _Part:
-        """M = G₁₁, g = G₁₀ and their rows F = `free` of a part's products G."""
-        m, g = np.ascontiguousarray(gram[1:, 1:]), gram[1:, 0]
-        return cls(m, g, m[free], g[free], m[np.ix_(free, free)])
+        """Of a part's products G [1 + C, 1 + C], F = `free`."""
+        F, o = 1 + free, 1 + _others(free, len(gram) - 1)
+        ff, fo, oo = gram[np.ix_(F, F)], gram[np.ix_(F, o)], gram[np.ix_(o, o)]
+        return cls(ff, fo, oo, gram[F, 0], gram[o, 0])
+
+
+def _others(free: np.ndarray, count: int) -> np.ndarray:
+    """Columns that are not free, of so many."""
+    return np.setdiff1d(np.arange(count), free)
 
 
 @dataclass(frozen=True)
@@ -178,29 +184,47 @@ class _EffectsProblem:
             V = (K + Σ_i M - M_Fᵀ T_i)⁻¹,  x̂ = V (η + Σ_i g - T_iᵀ g_F)         x ~ N(x̂, V)
             E b_i² = (S_i g_F - T_i x̂)² + diag S_i + diag T_i V T_iᵀ,  E x² = x̂² + diag V
 
+        As M_FF = S⁻¹ - D⁻¹, one inverse R = (I + D^½ M_FF D^½)⁻¹ of a part gives the rest, with
+        S = D^½ R D^½ and, for the columns F of T, of M - M_Fᵀ T, and of g - Tᵀ g_F
+
+            T_F = I - S D⁻¹,   D⁻¹ - D⁻¹ S D⁻¹,   D⁻¹ S g_F
+
         The new variance of a group is the mean of E b² over its columns and all parts, that of a
         size the mean of E x² over its columns.
         """
         D, K = self.spread(np.clip(sizes, *BOUNDS))
-        F = self.free
-        D_half = np.sqrt(D[F])
-        scale = np.outer(D_half, D_half)
+        F, o = self.free, _others(self.free, len(D))
+        D_half, D_inverse = np.sqrt(D[F]), 1.0 / D[F]
+        scale, identity = np.outer(D_half, D_half), np.eye(len(F))
+        FF, Fo = np.zeros(scale.shape), np.zeros((len(F), len(o)))  # sums of M - M_Fᵀ T
         information, pull, of_parts = np.diag(K), self.pull.copy(), []
         for part in self.parts:
-            S = inverse_and_volume(np.eye(len(F)) + scale * part.both)[0] * scale  # (D⁻¹ + M)⁻¹
-            T = S @ part.own
-            information += part.m - part.own.T @ T
-            pull += part.g - T.T @ part.own_g
-            of_parts.append((S, T))
+            S = inverse_and_volume(identity + scale * part.ff)[0]
+            FF += identity
+            FF -= S
+            S *= scale
+            T_o, S_g = S @ part.fo, S @ part.g_f
+            Fo += T_o
+            information[np.ix_(o, o)] += part.oo - part.fo.T @ T_o
+            pull[F] += D_inverse * S_g
+            pull[o] += part.g_o - T_o.T @ part.g_f
+            of_parts.append((S, T_o, S_g))
+        Fo *= D_inverse[:, None]
+        information[np.ix_(F, F)] += FF / scale
+        information[np.ix_(F, o)] += Fo
+        information[np.ix_(o, F)] += Fo.T
         V, _ = inverse_and_volume(information)
         x = V @ pull
+        order = np.concatenate((F, o))
+        V_ordered, x_ordered = np.ascontiguousarray(V[np.ix_(order, order)]), x[order]
         b_squares = np.zeros(len(D))
         numbers = np.repeat(x[None], len(self.parts), axis=0)
-        for x_b, (S, T), part in zip(numbers, of_parts, self.parts, strict=True):
-            b = S @ part.own_g - T @ x
+        for x_b, (S, T_o, S_g) in zip(numbers, of_parts, strict=True):
+            T = np.concatenate((identity - S * D_inverse, T_o), 1)
+            b = S_g - T @ x_ordered
             x_b[F] += b
             b_squares[F] += b**2 + np.diagonal(S)
-            b_squares[F] += ((T @ V) * T).sum(1)
+            b_squares[F] += np.einsum("ij,ij->i", T @ V_ordered, T)
         x_squares = x**2 + np.diagonal(V)
         count = len(self.parts)
         variances = [_mean(b_squares[c].sum(), count * len(c)) for c in self.groups]
