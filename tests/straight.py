@@ -190,10 +190,14 @@ class Straight(Trial):
 
     def linearise(self, numbers, near=None, noise_factor=None, remainder=None) -> Point:
         assert self.given is not None
+        return self.linearise_about(numbers, replace(self.given.path))
+
+    def linearise_about(self, numbers, path) -> Point:
+        assert self.given is not None
         columns = self.reference.columns
         d = np.concatenate((np.zeros(columns.base), columns.numbers(dict(numbers))))
-        linear = replace(self.given, e=self.given.e - self.given.j @ d)
-        return self._refuse_divergent(Point(dict(numbers), linear.path, linear))
+        linear = replace(self.given, e=self.given.e - self.given.j @ d, path=path)
+        return self._refuse_divergent(Point(dict(numbers), path, linear))
 
 
 def trial(made: Campaign, record: Record, given: Linear, fixed: tuple[str, ...] = ()) -> Straight:

@@ -163,7 +163,7 @@ def test_products_of_a_point_that_is_gone_are_not_taken_for_anothers(trial):
     apart, wanted = total(here)[0, 0], total(there)
     assert abs(apart / wanted[0, 0] - 1.0) > 1e-3
     total(last)  # of points passes are kept, too: the first one's and two more
-    stood, again = id(here.linear), there.linear
+    stood, again = id(here.path), there.path
     del here
     gc.collect()
     others = []
@@ -171,7 +171,20 @@ def test_products_of_a_point_that_is_gone_are_not_taken_for_anothers(trial):
         others.append(replace(again))
         if id(others[-1]) == stood:
             break
-    assert total(replace(there, linear=others[-1])) == pytest.approx(wanted)
+    assert total(replace(there, path=others[-1])) == pytest.approx(wanted)
+
+
+def test_a_point_that_is_linearised_again_has_the_products_that_it_had(trial):
+    """Its linearisation may be gone in between: it is known by its path."""
+    numbers = {"drag": np.array([0.3])}
+    point = trial.linearise(numbers)
+    before, path = trial.products.total(point, 1.0, trial.weight, Remainder()), point.path
+    point = None
+    gc.collect()
+    again = trial.linearise_about(numbers, path)
+    assert trial.products.total(again, 1.0, trial.weight, Remainder()) is before
+    elsewhere = trial.linearise_about({"drag": np.array([0.4])}, replace(path))
+    assert trial.products.total(elsewhere, 1.0, trial.weight, Remainder()) is not before
 
 
 def test_segments_on_which_the_model_runs_away_carry_no_weight(made):

@@ -22,7 +22,7 @@ from shiplog.diagnosis.trial.fitted import Fit, Point
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.models.causes import Cause
 
-KEPT_LINEARISATIONS = 6  # the others are computed again when needed
+KEPT_LINEARISATIONS = 2  # the others are computed again when needed
 
 
 class Table(dict[Key, Hypothesis]):
@@ -137,7 +137,7 @@ class Hypotheses:
         """A hypothesis with the trial linearised where it was."""
         point = one.point
         if isinstance(point, Place):
-            point = self.trial.linearise(point.numbers, point.path)
+            point = self.trial.linearise_about(point.numbers, point.path)
         return Fit(point, one.estimate, one.remainder)
 
 

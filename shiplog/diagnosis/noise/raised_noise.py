@@ -51,10 +51,11 @@ def residual(
 ) -> Residual:
     """r = e - J d: what numbers d [C], SI, leave of a pass; weight w [S] of its segments. Raises
     np.linalg.LinAlgError where its path diverged."""
-    kept = weight > 0.0  # a segment that says nothing has no likelihood
-    linear, weight = linear.pick(kept), weight[kept]
     # subtracted before it is squared: of products small differences of large numbers would be left
     alone = replace(linear, e=linear.e - linear.j @ d, j=linear.j[..., :0])
+    kept = weight > 0.0  # a segment that says nothing has no likelihood
+    if not kept.all():
+        alone, weight = alone.pick(kept), weight[kept]
     startless = likelihood.startless(likelihood.weighed(alone, nominal), nominal)
     return Residual(startless, nominal, weight, counts)
 

@@ -12,7 +12,7 @@ from weakref import ref
 
 import numpy as np
 
-from shiplog.diagnosis.linear.linear_segments import Linear
+from shiplog.diagnosis.linear.linear_segments import Path
 from shiplog.diagnosis.linear.measurement_correction import Moved
 from shiplog.diagnosis.linear.segments import Cut
 from shiplog.diagnosis.noise.part_products import PartPass
@@ -40,7 +40,8 @@ class Cache:
     starts    where fits converged, written by `evaluate.resume`
     readings  numbers of sensors' causes, and the trial as read with them: as it is, and as it was
               last; written by `Trial`. The rest is written by `Products`:
-    passes    of a point, by weights: the first point's, and the last ones
+    passes    of a point, by weights: of those that were asked for last. A point is known by its
+              path, which outlives its linearisation
     totals    of a point, by λ, weights and shape of the process noise
     volumes   of the first point, the same: log|R|
     voyages   products of each voyage of the last point that they were asked for
@@ -49,7 +50,7 @@ class Cache:
     starts: dict[Key, Start] = field(default_factory=dict)
     readings: list[tuple[Numbers, Read]] = field(default_factory=list)
     # no id() of a point: one that is gone leaves its own to the next one
-    passes: list[tuple[ref[Linear], bytes, Sequence[PartPass]]] = field(default_factory=list)
-    totals: list[tuple[ref[Linear], tuple, Total]] = field(default_factory=list)
+    passes: list[tuple[ref[Path], bytes, Sequence[PartPass]]] = field(default_factory=list)
+    totals: list[tuple[ref[Path], tuple, Total]] = field(default_factory=list)
     volumes: dict[tuple, float] = field(default_factory=dict)
-    voyages: tuple[ref[Linear], tuple, dict[object, np.ndarray]] | None = None
+    voyages: tuple[ref[Path], tuple, dict[object, np.ndarray]] | None = None

@@ -150,7 +150,7 @@ class Trial:
         wide = ref.wide
         if noise_factor is not None:
             wide = ref.allowed_distance(noise_factor, remainder or Remainder())
-        cut, moved, observed = self._reading(numbers)
+        cut, _, _ = self._reading(numbers)
         whole = np.concatenate((ref.theta, ref.columns.numbers(dict(numbers))))
         about = ref.expected_acceleration(cut, self.grid)
         if isinstance(near, Point):
@@ -161,6 +161,13 @@ class Trial:
             path = linearisation.fit_path(
                 ref.model, whole, cut, self.grid, wide, near, rounds, about
             )
+        return self.linearise_about(numbers, path)
+
+    def linearise_about(self, numbers: Numbers, path: Path) -> Point:
+        """The trial linearised with these numbers about this very path. Raises as `linearise`."""
+        ref = self.reference
+        cut, moved, observed = self._reading(numbers)
+        whole = np.concatenate((ref.theta, ref.columns.numbers(dict(numbers))))
         linear = linearisation.linear(
             ref.model, whole, cut, self.grid, path, moved, observed, ref.wide
         )

@@ -25,8 +25,8 @@ from shiplog.diagnosis.nominal.nominal_campaign import Campaign
 from shiplog.diagnosis.trial.cache import Cache, Total
 from shiplog.diagnosis.trial.fitted import Point
 
-KEPT_PASSES = 3  # 0.2 MB a segment each
-KEPT_TOTALS = 41  # one point needs about a dozen levels, and again for each family
+KEPT_PASSES = 2  # of the first point and the last one, 0.2 MB a segment each
+KEPT_TOTALS = 24  # 0.7 MB each; one point needs about a dozen levels, and again with each family
 
 
 @dataclass(frozen=True)
@@ -49,22 +49,18 @@ class Products:
         """The point's parts without their starts, with the columns of every family."""
         key = weight.tobytes()
         kept = [one for one in self.cache.passes if one[0]() is not None]
-        for of, known, passes in kept:
-            if of() is point.linear and known == key:
-                return passes
-        reference = self.campaign.reference
-        unit = np.append(reference.columns.unit, np.ones(self.omitted.count))
-        passes = tuple(
-            part_products.passes(
+        found = next((one for one in kept if one[0]() is point.path and one[1] == key), None)
+        if found is None:
+            self.cache.passes = kept = kept[1 - KEPT_PASSES :]  # before another one is made
+            reference = self.campaign.reference
+            unit = np.append(reference.columns.unit, np.ones(self.omitted.count))
+            passes = part_products.passes(
                 point.linear, reference.process_noise, self.parts, unit, weight, self._accelerations
             )
-        )
-        self.cache.passes = [
-            *kept[:1],
-            *kept[1:][2 - KEPT_PASSES :],
-            (ref(point.linear), key, passes),
-        ]
-        return passes
+            found = ref(point.path), key, tuple(passes)
+        # the one that was asked for last is the last: the first point's stays, as each level has it
+        self.cache.passes = [*(one for one in kept if one is not found), found]
+        return found[2]
 
     def _accelerations(self, cut: Cut) -> np.ndarray:
         """Φ of the discrepancy: a weight w acts as an acceleration Φ w."""
@@ -92,18 +88,27 @@ class Products:
         """G [1 + C, 1 + C] of all parts (4), C as in `each_part`, and log|R| (5)."""
         key = (noise, weight.tobytes(), remainder.shape)
         size = 1 + len(self._deviation(remainder))
+        if kept := self._kept(point, key, size):
+            return kept
+        found = self._added(point, noise, weight, remainder)
+        self.cache.totals = [*self.cache.totals[1 - KEPT_TOTALS :], (ref(point.path), key, found)]
+        return found
+
+    def _kept(self, point: Point, key: tuple, size: int) -> Total | None:
+        """A total that was worked out before, of as many columns or more."""
         for of, known, kept in self.cache.totals:
-            if of() is point.linear and known == key and len(kept.G) >= size:
+            if of() is point.path and known == key and len(kept.G) >= size:
                 return kept if len(kept.G) == size else Total(kept.G[:size, :size], kept.volume)
-        whole = np.zeros((size, size))
+        return None
+
+    def _added(self, point: Point, noise: float, weight: np.ndarray, remainder: Remainder) -> Total:
+        """As `total`, added voyage by voyage."""
+        whole = np.zeros((1 + len(self._deviation(remainder)),) * 2)
         logdet = sum(one.logdet for one in self._passes(point, weight))
         for _, one in self._voyages(point, noise, weight, remainder):
             whole += one.G
             logdet += one.volume
-        found = Total(whole, logdet)
-        kept = (ref(point.linear), key, found)
-        self.cache.totals = [*self.cache.totals[1 - KEPT_TOTALS :], kept]
-        return found
+        return Total(whole, logdet)
 
     def leave_out(
         self, point: Point, noise: float, weight: np.ndarray, remainder: Remainder,
@@ -123,10 +128,10 @@ class Products:
             return self.total(point, noise, np.where(left_out, 0.0, weight), remainder).G
         key = (noise, weight.tobytes(), remainder)
         kept = self.cache.voyages
-        if kept is None or kept[0]() is not point.linear or kept[1] != key:
+        if kept is None or kept[0]() is not point.path or kept[1] != key:
             every = self._voyages(point, noise, weight, remainder)
             voyages = {of: one.G for of, one in every}
-            self.cache.voyages = kept = (ref(point.linear), key, voyages)
+            self.cache.voyages = kept = (ref(point.path), key, voyages)
         return _sum([G for of, G in kept[2].items() if of not in gone])
 
     def _voyages(
@@ -151,10 +156,11 @@ class Products:
     ) -> float:
         """log|R| (5) at one λ: that of the first point, for every hypothesis. Otherwise a model
         with less damping would gain evidence because it amplifies the noise."""
-        key = (noise_factor, remainder.shape, weight.tobytes())
+        key = (noise_factor, weight.tobytes(), remainder.shape)
         if key not in self.cache.volumes:
             alike = replace(remainder, kind=NOMINAL)  # a family has no deviation of its own
-            self.cache.volumes[key] = self.total(first, noise_factor, weight, alike).volume
+            made = self._kept(first, key, 0) or self._added(first, noise_factor, weight, alike)
+            self.cache.volumes[key] = made.volume
         return self.cache.volumes[key]
 
 
