@@ -39,7 +39,8 @@ def linearised(
 ) -> tuple[np.ndarray, np.ndarray]:
     """States [N, I, 6] and their derivatives by θ [N, I, 6, P], exact for the Euler rollout.
 
-    out   arrays of these shapes to be filled: new memory costs as much as what is put into it
+    out   what an earlier call of these shapes gave, to be overwritten: new memory costs as much as
+          what is put into it
     """
     found = rollouts.slopes(model, theta, data, out)
     if found is None:

@@ -218,6 +218,20 @@ def test_a_window_is_what_it_is_whoever_stands_next_to_it():
         assert all(np.array_equal(a[0], w[i]) for a, w in zip(alone, whole, strict=True))
 
 
+def test_memory_of_an_earlier_call_is_used_again_and_no_other():
+    model, theta, actuators = MODELS["esso-osaka"]()
+    data = sailing(actuators)
+    first = sensitivities.linearised(model, 1.1 * theta, data)
+    wanted = sensitivities.linearised(model, theta, data)
+    found = sensitivities.linearised(model, theta, data, out=first)
+    assert all(a is b for a, b in zip(found, first, strict=True))
+    assert all(np.array_equal(a, b) for a, b in zip(found, wanted, strict=True))
+    plain = tuple(np.array(values) for values in wanted)
+    for bad in (plain, (wanted[0], wanted[1][:-1]), (wanted[0].astype("f4"), wanted[1])):
+        with pytest.raises(ValueError, match="earlier call"):
+            sensitivities.linearised(model, theta, data, out=bad)
+
+
 def test_levels_agree(monkeypatch):
     model, theta, actuators = MODELS["esso-osaka"]()
     data = sailing(actuators)

@@ -62,12 +62,19 @@ def pointer(values: np.ndarray) -> int:
     return values.ctypes.data
 
 
-def aligned(*shape: int) -> np.ndarray:
-    """Zeros where a cache line begins."""
+def unset(*shape: int) -> np.ndarray:
+    """An array that begins where a cache line does, of any numbers."""
     size = int(np.prod(shape))
-    whole = np.zeros(size + 8)
+    whole = np.empty(size + 8)
     skip = -(whole.ctypes.data // 8) % 8
     return whole[skip : skip + size].reshape(shape)
+
+
+def aligned(*shape: int) -> np.ndarray:
+    """Zeros where a cache line begins."""
+    found = unset(*shape)
+    found[...] = 0.0
+    return found
 
 
 _known: dict[Any, Kernel | None] = {}

@@ -9,7 +9,7 @@ import numpy as np
 
 from shiplog.nomenclature.channels import VELOCITY_WEIGHTS
 from shiplog.simulation.kernel import kinds
-from shiplog.simulation.kernel.kinds import Kernel, Purpose, aligned, contiguous, pointer
+from shiplog.simulation.kernel.kinds import Kernel, Purpose, aligned, contiguous, pointer, unset
 from shiplog.simulation.kernel.windows import BLOCK, STATES, Windows
 from shiplog.simulation.window_series import Normal, WindowSeries
 
@@ -77,13 +77,15 @@ def slopes(
     if kernel is None:
         return None
     count, instants = data.measured.shape[:2]
-    shape = (count, instants, STATES)
-    states, found = out or (np.empty(shape), np.empty((*shape, len(theta))))
-    work = aligned(STATES * _padded(len(theta), kernel.lanes) * kernel.lanes)
+    shape, padded = (count, instants, STATES), _padded(len(theta), kernel.lanes)
+    states, found = out or (np.empty(shape), unset(*shape, padded)[..., : len(theta)])
+    _check_kept(states, shape, STATES)
+    _check_kept(found, (*shape, len(theta)), padded)
+    work = aligned(STATES * padded * kernel.lanes)
     c, given = kernel.prepared(model, theta), _given(data)
     if count:
         kernel.functions["slopes_of"](
-            pointer(c), *map(pointer, given), pointer(states), pointer(found), pointer(work),
+            pointer(c), *map(pointer, given), pointer(states), found.ctypes.data, pointer(work),
             count, instants, *_steps(model),
         )  # fmt: skip
     return states, found
@@ -115,6 +117,22 @@ def normal(model: Any, theta: np.ndarray, data: WindowSeries, free: Sequence[int
         )  # fmt: skip
     half = np.moveaxis(pull, 2, 1).reshape(-1, padded)[:count, :n]
     return Normal(loss[:count], half, _square(gram.sum(-1), padded)[:n, :n])
+
+
+def _check_kept(values: np.ndarray, shape: tuple[int, ...], row: int) -> None:
+    """Raises ValueError for memory that is not laid out as an earlier call has given it: rows of
+    `row` numbers, of which the last ones may be hidden."""
+    bytes_, strides = 8, [8]
+    for size in (row, *shape[-2:0:-1]):
+        bytes_ *= size
+        strides.append(bytes_)
+    if (
+        values.shape != shape
+        or values.dtype != float
+        or values.strides != tuple(strides[::-1])
+        or not values.flags.writeable
+    ):
+        raise ValueError(f"out has to be what an earlier call gave, of the shape {shape}")
 
 
 def _driven(data: WindowSeries) -> int:

@@ -136,7 +136,7 @@ class Windows:
             "start": STATES, "actuator": given["I"] * (self.sizes.driven - 2),
             "wind": given["I"] * 2, "dt": given["I"] - 1, "steps": instants, "weight": 1,
             "states": instants * STATES, "measured": instants * STATES,
-            "slopes": instants * (STATES * self.sizes.coefficients),
+            "slopes": instants * (STATES * self.padded),
         }  # fmt: skip
         return {n: block.rows(given[n], width) for n, width in widths.items() if n in given}
 
@@ -148,6 +148,12 @@ class Windows:
         for i in range(2):
             f.store_lanes(rows["wind"].gathered(k * 2 + i), x, STATES + actuators + i)
         return rows["dt"].gathered(k) * given["part"]
+
+    @property
+    def padded(self) -> int:
+        """P filled up to whole vectors, so that rows begin where a cache line does."""
+        lanes = self.module.lanes
+        return -(-self.sizes.coefficients // lanes) * lanes
 
     def rollout(self, function: str) -> None:
         """States [N, I, 6] of `function`, ν̇ without derivatives."""
@@ -193,8 +199,7 @@ class Windows:
         arguments = [(n, POINTER) for n in names] + [
             ("N", INT), ("I", INT), ("substeps", INT), ("part", DOUBLE)
         ]  # fmt: skip
-        P = self.sizes.coefficients
-        padded = -(-P // self.module.lanes) * self.module.lanes
+        P, padded = self.sizes.coefficients, self.padded
         with self.module.function("slopes_of", arguments) as (f, values):
             given = dict(zip([n for n, _ in arguments], values, strict=True))
             x, out = f.reserve(self.sizes.inputs), f.reserve(self.sizes.outputs)
@@ -208,9 +213,9 @@ class Windows:
                 rows["states"].scattered(begun, 0)
                 with f.loop(f.int(STATES * padded)) as i:
                     f.store_lanes(f.lanes(0.0), s, i)
-                with f.loop(f.int(STATES * P)) as i:
+                with f.loop(f.int(STATES * padded), 0, self.module.lanes) as i:
                     for pointer in rows["slopes"].pointers:
-                        f.store(f.number(0.0), pointer, i)
+                        f.store(f.lanes(0.0), pointer, i)
                 with f.loop(given["I"] - 1, outer=True) as k:
                     h = self._driven(f, rows, given, k, x)
                     with f.loop(given["substeps"], outer=True):
@@ -220,7 +225,7 @@ class Windows:
                         advance(f, x, out, step)
                     now = [f.load_lanes(x, i) for i in range(STATES)]
                     rows["states"].scattered(now, k * STATES + STATES)
-                    self._kept(f, rows["slopes"], s, padded, (k + 1) * (STATES * P))
+                    self._kept(f, rows["slopes"], s, padded, (k + 1) * (STATES * padded))
 
     def _sensitivities(self, f, s, padded, out, step, count, columns) -> None:
         """sₖ₊₁ of `count` coefficients; the places of their columns, or None for all in order."""
@@ -247,16 +252,10 @@ class Windows:
                 f.store_lanes(now + moved, s, p + (2 * row + 1) * padded)
 
     def _kept(self, f: Function, slopes: Rows, s: Value, padded: int, offset: Value) -> None:
-        """Sensitivities into a row of each window's [6, P]."""
-        P, lanes = self.sizes.coefficients, self.module.lanes
-        for i in range(STATES):
-            with f.loop(f.int(P // lanes * lanes), 0, lanes) as p:
-                rows = [f.load_lanes(s, p + (i * padded + j)) for j in range(lanes)]
-                slopes.scattered(rows, offset + i * P + p)
-            at = P // lanes * lanes
-            if at < P:
-                rows = [f.load_lanes(s, f.int(i * padded + j)) for j in range(at, P)]
-                slopes.scattered(rows, offset + (i * P + at))
+        """Sensitivities into a row of each window's [6, padded P]."""
+        lanes = self.module.lanes
+        with f.loop(f.int(STATES * padded), 0, lanes) as at:
+            slopes.scattered([f.load_lanes(s, at + j) for j in range(lanes)], offset + at)
 
     def normal(self, function: str, weights: Sequence[float]) -> None:
         """Loss [N], half its gradient [N, n], and weighted JᵀJ [blocks, 4, 4] a lane each, by n
@@ -320,19 +319,23 @@ class Windows:
                     advance(f, x, out, step)
                 time = windows["steps"].gathered(k + 1)
                 width = f.intrinsic("sqrt", time)
-                for q, (place, w) in enumerate(zip(VELOCITY_IN_STATE, weights, strict=True)):
+                pulls, factors = [], []
+                for place, w in zip(VELOCITY_IN_STATE, weights, strict=True):
                     y = windows["measured"].gathered(k * STATES + (STATES + place))
                     scale = width * w
                     error = (f.load_lanes(x, place) - y) * scale
                     f.store_lanes(f.load_lanes(total) + error * error, total)
-                    pulling, factor = error * scale, scale * root
-                    row = ((k - begin) * 3 + q) * padded
-                    with f.loop(n) as p:
+                    pulls.append(error * scale)
+                    factors.append(scale * root)
+                row = (k - begin) * 3 * padded
+                with f.loop(n) as p:
+                    pulled = f.load_lanes(pull, base + p)
+                    for q, place in enumerate(VELOCITY_IN_STATE):
                         slope = f.load_lanes(s, p + padded * place)
-                        f.store_lanes(
-                            f.load_lanes(pull, base + p) + pulling * slope, pull, base + p
-                        )
-                        f.store_lanes(used.chosen(slope * factor, 0.0), given["rows"], row + p)
+                        pulled = pulled + pulls[q] * slope
+                        own = used.chosen(slope * factors[q], 0.0)
+                        f.store_lanes(own, given["rows"], row + padded * q + p)
+                    f.store_lanes(pulled, pull, base + p)
             self._added(f, given, (end - begin) * 3)
         f.store_lanes(f.load_lanes(total), given["loss"], first / self.module.lanes)
 
