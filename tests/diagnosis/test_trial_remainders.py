@@ -15,7 +15,7 @@ from shiplog.diagnosis.hypotheses import evidence, fits, weighing
 from shiplog.diagnosis.noise import remainder
 from shiplog.diagnosis.noise.discrepancy import EVEN
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
-from shiplog.diagnosis.trial.fitted import Fit
+from shiplog.diagnosis.trial.fitted import Fit, Level
 
 # --- changes
 
@@ -257,3 +257,21 @@ def test_the_top_of_a_parabola_by_hand():
     assert of(4, 0, 8) == (1, 0.0, 0.0)
     _, gain, _ = of(5, 6, 7)  # the top is 4.7 steps away: one step is as far as it is trusted
     assert gain == pytest.approx(4.7**2 - 3.7**2)
+
+
+@pytest.mark.parametrize("power", (-17, -3, 0, 1, 6, 17))
+def test_the_noise_of_many_observations_is_reached_in_one_move(monkeypatch, power):
+    """Of -n log λ - S/(2 λ²): three levels, then three about the greatest."""
+    step, n = evidence.FINE_STEP, 1000.0
+    asked: list[float] = []
+
+    def level(_, __, noise, *___):
+        asked.append(noise)
+        value = -n * math.log(noise) - 0.5 * n * (step**power / noise) ** 2
+        return Level(noise, np.zeros((1, 1)), np.zeros((0, 0)), np.zeros(0), value)
+
+    monkeypatch.setattr(evidence, "level", level)
+    found = evidence.top(evidence.levels(None, None))
+    assert found.noise_factor == pytest.approx(step**power)
+    assert len(asked) <= 6
+    assert found.value == pytest.approx(-n * power * math.log(step) - 0.5 * n, abs=0.01)

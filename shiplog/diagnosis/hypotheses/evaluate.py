@@ -169,8 +169,8 @@ def _posterior(
         raise np.linalg.LinAlgError("the path diverged")
     if steady and lately is not None:
         return evidence.fit(trial, point, included, lately, remainder)
-    known = 0.0 if lately is None else bend
-    return evidence.scan(trial, point, (), included, lately, remainder, known)[0]
+    near, bend = (1.0, 0.0) if lately is None else (lately, bend)
+    return evidence.scan(trial, point, (), included, near, remainder, bend)[0]
 
 
 def _halved(

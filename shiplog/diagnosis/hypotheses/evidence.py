@@ -7,7 +7,7 @@ the change of weights of its remainder's family. A candidate is one cause in add
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,9 +21,9 @@ from shiplog.diagnosis.trial.trial import Numbers, Trial
 from shiplog.models.causes import Cause
 
 FINE_STEP = 1.08  # of λ: its levels are whole powers of it, on one grid for all hypotheses
-NOISES = (-9, -5, -2, 0, 2, 4, 9, 13, 18, 22, 27, 36)  # powers tried first: λ of 0.5 to 16
-FARTHEST = 3  # steps to the top of a parabola from the best of its levels, at most
-MOST_MOVES = 6  # of the best level from three to others, at most
+FARTHEST = 36  # steps from the nominal noise, at most: λ of 1/16 to 16
+LONGEST = 18  # steps at once, at most: four times as much noise, or a quarter
+MOST_MOVES = 8  # of three levels to others, at most
 LITTLE_NATS = 1.0  # gain of a step, too small to decide between hypotheses
 MOST_PATHS = 8  # of the model as it stands, one closer to the measurement than the other, at most
 NO_CHANGE_OF_NOISE = Remainder()
@@ -310,16 +310,15 @@ def _log_share_of_bounds(
 
 
 def levels(
-    trial: Trial, point: Point, included: Sequence[str] = (), near: float | None = None,
+    trial: Trial, point: Point, included: Sequence[str] = (), near: float = 1.0,
     remainder: Remainder = NO_CHANGE_OF_NOISE, bend: float = 0.0,
 ) -> list[Level]:  # fmt: skip
-    """The base hypothesis at each λ = FINE_STEPᵏ that is tried: from 1 outwards while
-    log Z(λ) + log p(λ) rises, then at three about the best, which are moved towards the top of the
-    parabola through them until the best is the middle one. All hypotheses share one grid, since
+    """The base hypothesis at each λ = FINE_STEPᵏ that is tried: at three, which are moved towards
+    the top (`_steps_to_top`) until the best is the middle one. All hypotheses share one grid, since
     the volume of each λ is that of the first point.
 
-    near   λ about which alone it is tried
-    bend   of the parabola, where it is known: two levels give its top"""
+    near   λ about which it begins
+    bend   second difference, where it is known: two levels then give the top, if it is near"""
     tried: dict[int, Level] = {}
 
     def log_Z(power: int) -> float:
@@ -327,37 +326,32 @@ def levels(
             tried[power] = level(trial, point, FINE_STEP**power, included, remainder)
         return tried[power].value
 
-    here = _best_of_all(log_Z) if near is None else _power(near)
+    here = _power(near)
     if bend < 0.0:
         slope = log_Z(here + 1) - log_Z(here) - 0.5 * bend
-        away = -slope / bend
-        if -0.75 < away < 1.75:
+        if -0.75 < -slope / bend < 1.75:
             return list(tried.values())
-        here += round(max(-FARTHEST, min(FARTHEST, away)))
+        here += round(_steps_to_top(slope, bend))
     for _ in range(MOST_MOVES):
+        here = max(-FARTHEST, min(FARTHEST, here))
         below, at, above = (log_Z(here + way) for way in (-1, 0, 1))
         if max(below, above) <= at:
             break
-        curvature, step = below - 2.0 * at + above, math.copysign(1.0, above - below)
-        if curvature < 0.0:
-            step = 0.5 * (below - above) / curvature
-        here += round(max(-FARTHEST, min(FARTHEST, step))) or round(math.copysign(1.0, step))
+        steps = _steps_to_top(0.5 * (above - below), below - 2.0 * at + above)
+        here += round(steps) or round(math.copysign(1.0, steps))
     return list(tried.values())
 
 
-def _best_of_all(log_Z: Callable[[int], float]) -> int:
-    """The best of NOISES, from 1 outwards while the value rises."""
-    middle = NOISES.index(0)
-    best = middle
-    for way in (1, -1):
-        i = middle
-        while 0 <= i + way < len(NOISES) and log_Z(NOISES[i + way]) > log_Z(NOISES[i]):
-            i += way
-        if log_Z(NOISES[i]) > log_Z(NOISES[best]):
-            best = i
-        if best != middle:
-            break
-    return NOISES[best]
+def _steps_to_top(slope: float, bend: float) -> float:
+    """Steps of FINE_STEP to the greatest log evidence, from its slope s and second difference b.
+
+    Of n observations of a noise v(λ) = -n log λ - S/(2 λ²). At λ = 1, with h the logarithm of a
+    step, s = h (S - n) and b = -2 h² S; at its greatest λ² = S/n, or log λ = -½ log(1 + 2 h s/b).
+    A parabola in log λ, the same nearby, would take many steps where the noise is far greater."""
+    h = math.log(FINE_STEP)
+    if bend >= 0.0 or 1.0 + 2.0 * h * slope / bend <= math.exp(-2.0 * h * LONGEST):
+        return math.copysign(LONGEST, slope)
+    return max(-0.5 * math.log1p(2.0 * h * slope / bend) / h, -LONGEST)
 
 
 def _power(noise: float) -> int:
@@ -408,7 +402,7 @@ def top_of(
 
 def scan(
     trial: Trial, point: Point, candidates: Sequence[Cause], included: Sequence[str] = (),
-    near: float | None = None, remainder: Remainder = NO_CHANGE_OF_NOISE, bend: float = 0.0,
+    near: float = 1.0, remainder: Remainder = NO_CHANGE_OF_NOISE, bend: float = 0.0,
 ) -> tuple[Estimate, list[Estimate]]:  # fmt: skip
     """The base hypothesis at its most probable λ; and each candidate in addition to it, at its
     own, with its log Bayes factor as its evidence, the greatest first. `bend` as `levels` has

@@ -158,7 +158,7 @@ def weigh(of: CauseSet, numbers: Mapping[str, np.ndarray], at: Point) -> list[Hy
 def _plain(of: CauseSet, numbers: Mapping[str, np.ndarray], at: Point) -> Rough | None:
     """The set under one factor λ of all channels, with levels about the most probable λ under
     `raised` and under `nominal`; None where its fit diverges."""
-    trial, included, point, near = of.trial, of.included, at, None
+    trial, included, point, near = of.trial, of.included, at, 1.0
     if of.labels:
         assert of.nothing is not None
         start = Start(numbers, at.path)
@@ -167,7 +167,7 @@ def _plain(of: CauseSet, numbers: Mapping[str, np.ndarray], at: Point) -> Rough 
             return None
         point, near = fit.point, fit.estimate.noise_factor
     levels = evidence.levels(trial, point, included, near, RAISING)
-    if near is not None and near > RAISED_FROM:  # the noise may be nominal again
+    if near > RAISED_FROM:  # the noise may be nominal again
         levels.append(evidence.level(trial, point, 1.0, included, RAISING))
     nominal = best(trial, levels, NOMINAL).noise_factor
     if not evidence.enclosed(levels, nominal):  # its prior favours the nominal noise
