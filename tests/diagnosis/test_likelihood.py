@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from shiplog.diagnosis.linear.linear_segments import Linear, Path
+from shiplog.diagnosis.linear.linear_segments import AT_A_TIME, Linear, Path, acting
 from shiplog.diagnosis.linear.segments import Cut
 from shiplog.diagnosis.noise import likelihood, noise_estimate, part_products
 from shiplog.diagnosis.noise.likelihood import ProcessNoise
@@ -207,6 +207,26 @@ def test_less_an_acceleration_is_less_what_it_does():
     accelerations = np.random.default_rng(9).standard_normal((3, 9))
     moved = replace(given, e=given.e + np.einsum("sbcz,sz->sbc", given.z[..., 6:], accelerations))
     assert moved.less(accelerations).e == pytest.approx(given.e, abs=1e-12)
+
+
+@pytest.mark.parametrize("segments", (0, 1, 32, 71))
+def test_what_weights_do_is_the_same_of_some_segments_at_a_time(segments):
+    """Weights of all segments, or others in each; never more than some are made at once."""
+    rng = np.random.default_rng(segments)
+    phi = rng.standard_normal((segments, 9, 4))
+    cut = linear(1).cut.pick(np.zeros(segments, dtype=int))
+    cut = replace(cut, rows=np.arange(segments))
+    asked: list[int] = []
+
+    def made(some: Cut) -> np.ndarray:
+        asked.append(len(some))
+        return phi[some.rows]
+
+    for weights in (rng.standard_normal(4), rng.standard_normal((segments, 4))):
+        found = acting(made, cut, weights)
+        assert found.shape == (segments, 9)
+        assert found == pytest.approx(acting(phi, cut, weights), abs=1e-12)
+    assert max(asked) <= AT_A_TIME
 
 
 @EACH

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.hypotheses import evidence
-from shiplog.diagnosis.linear.linear_segments import Linear
+from shiplog.diagnosis.linear.linear_segments import Linear, acting
 from shiplog.diagnosis.noise import discrepancy
 from shiplog.diagnosis.noise.remainder import CHANGE_SIZES
 from shiplog.diagnosis.nominal import voyage_effects
@@ -83,12 +84,13 @@ def less_parts(trial: Trial, linear: Linear, fit: Fit) -> Linear:
     columns, campaign = trial.reference.columns, trial.campaign
     theta = numbers_from_point(trial, fit) / columns.unit
     deviation = math.hypot(1.0, campaign.apart) * campaign.effects.deviation
+    misfit = trial.reference.misfit
     accelerations = np.zeros((len(linear.e), linear.z.shape[-1] - 6, 0))
-    if trial.reference.misfit is not None:
-        accelerations = trial.reference.misfit.accelerations(linear.cut, trial.grid)
+    if misfit is not None:
+        accelerations = partial(misfit.accelerations, g=trial.grid)
     begins = trial.rows[[rows[0] for rows in trial.parts]]
     part = np.searchsorted(begins, linear.cut.rows, side="right") - 1
-    b = np.zeros((len(linear.e), columns.linearised + accelerations.shape[-1]))
+    b = np.zeros((len(linear.e), len(columns.unit)))
     each = trial.products.each_part(
         fit.point, fit.estimate.noise_factor, trial.weight, fit.remainder
     )  # fmt: skip
@@ -138,7 +140,7 @@ def acts_on(trial: Trial, fit: Fit, family: str) -> tuple[str, ...]:
     columns = trial.families[family]
     w = np.zeros(of.count)
     w[columns - of.families[0].columns[0]] = level.mean[-len(columns) :]
-    accelerations = of.accelerations(fit.point.linear.cut, trial.grid) @ w
+    accelerations = acting(partial(of.accelerations, g=trial.grid), fit.point.linear.cut, w)
     size = (
         accelerations.reshape(len(accelerations), 3, -1).std((0, 2))
         / trial.reference.process_noise.acceleration

@@ -13,7 +13,7 @@ The acceleration a at the nodes of a segment is process noise n and that of the 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -82,7 +82,7 @@ def nominal_side_force(campaign: Campaign, g: SegmentGrid) -> Remainder | None:
     linear = reference.nominal
     if linear is None or not campaign.weight.sum():
         return None
-    accelerations = campaign.discrepancy.accelerations(linear.cut, g)
+    accelerations = partial(campaign.discrepancy.accelerations, g=g)
     unit, c = reference.columns.unit, reference.counts
     d = np.empty((len(linear.e), len(unit)))
     names = np.unique(campaign.voyage)

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from shiplog.diagnosis.linear.segments import Cut, SegmentGrid
+
+AT_A_TIME = 32  # segments, whose accelerations by weights are a few megabytes
+
+# Φ [S, 3J, W], acceleration at the nodes by each weight, SI, of all segments that were linearised;
+# or how to make that of some of them
+Accelerations = np.ndarray | Callable[[Cut], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -52,7 +59,7 @@ class Linear:
         if len(self.lost) != len(self.cut):
             object.__setattr__(self, "lost", np.zeros(len(self.cut), dtype=bool))
 
-    def pick(self, keep: np.ndarray) -> Linear:
+    def pick(self, keep: np.ndarray | slice) -> Linear:
         """Some of the segments."""
         path = Path(self.path.start[keep], self.path.acceleration[keep])
         parts = (getattr(self, name)[keep] for name in ("e", "z", "j", "lost"))
@@ -62,18 +69,34 @@ class Linear:
         """e - Zₐ a: without what `accelerations` a [S, 3J] at the nodes do to the observations."""
         return replace(self, e=self.e - np.einsum("sbcz,sz->sbc", self.z[..., 6:], accelerations))
 
-    def less_numbers(self, numbers: np.ndarray, accelerations: np.ndarray) -> Linear:
-        """e - J d - Zₐ Φ w, with other numbers (d, w) [S, C + W] in each segment, SI; Φ
-        `accelerations` [S, 3J, W] of each weight at the nodes."""
+    def less_numbers(self, numbers: np.ndarray, accelerations: Accelerations) -> Linear:
+        """e - J d - Zₐ Φ w, with other numbers (d, w) [S, C + W] in each segment, SI."""
         count = self.j.shape[-1]
         e = self.e - np.einsum("sbnc,sc->sbn", self.j, numbers[:, :count])
-        return replace(self, e=e).less(np.einsum("szw,sw->sz", accelerations, numbers[:, count:]))
+        return replace(self, e=e).less(acting(accelerations, self.cut, numbers[:, count:]))
 
     def joined(self, other: Linear) -> Linear:
         """These segments and others of the same record."""
         path = Path(*(_both(self.path, other.path, name) for name in ("start", "acceleration")))
         parts = (_both(self, other, name) for name in ("e", "z", "j", "lost"))
         return Linear(self.cut.joined(other.cut), path, *parts)
+
+
+def acting(accelerations: Accelerations, cut: Cut, weights: np.ndarray) -> np.ndarray:
+    """Φ w [S, 3J] of weights [W], or of others in each segment [S, W]. Where Φ is made, that of
+    AT_A_TIME segments is held at a time."""
+    if not callable(accelerations):
+        return _times(accelerations, weights)
+    own = weights.ndim > 1
+    parts = [slice(at, at + AT_A_TIME) for at in range(0, max(len(cut), 1), AT_A_TIME)]
+    each = (
+        _times(accelerations(cut.pick(part)), weights[part] if own else weights) for part in parts
+    )
+    return np.concatenate(list(each))
+
+
+def _times(phi: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    return phi @ weights if weights.ndim == 1 else np.einsum("szw,sw->sz", phi, weights)
 
 
 def _both(one: object, other: object, name: str) -> np.ndarray:

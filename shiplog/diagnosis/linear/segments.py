@@ -45,7 +45,7 @@ class Cut:
     def __len__(self) -> int:
         return len(self.rows)
 
-    def pick(self, keep: np.ndarray) -> Cut:
+    def pick(self, keep: np.ndarray | slice) -> Cut:
         """Some of the segments."""
         return replace(self, **{name: getattr(self, name)[keep] for name in PER_SEGMENT})
 

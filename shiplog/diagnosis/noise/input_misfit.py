@@ -10,6 +10,7 @@ it.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -74,7 +75,7 @@ def estimate(
     whole = Misfit(network, axes)
     total = part_products.whole(
         linear, process_noise, np.append(unit, np.ones(3 * count)),
-        accelerations=lambda cut: whole.accelerations(cut, g),
+        accelerations=partial(whole.accelerations, g=g),
     ).G  # fmt: skip
     size = max(INPUT_SIZES, key=lambda one: _likelihood(total, known, one))
     information = total[1 + len(known) :, 1 + len(known) :]

@@ -19,23 +19,17 @@ All is in units of the numbers. A part is small, so that a campaign may have any
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import get_blas_funcs
 
-from shiplog.diagnosis.linear.linear_segments import Linear
-from shiplog.diagnosis.linear.segments import Cut
+from shiplog.diagnosis.linear.linear_segments import AT_A_TIME, Accelerations, Linear
 from shiplog.diagnosis.noise import likelihood
 from shiplog.diagnosis.noise.likelihood import InverseKernels, ProcessNoise
 
-AT_A_TIME = 32  # segments of a campaign without parts: a few megabytes of products
-
 _syrk, _trsm = get_blas_funcs(("syrk", "trsm"), dtype=np.float64)
-
-# Φ [S, 3J, W] of all segments that were linearised, SI; or how to make that of some of them
-Accelerations = np.ndarray | Callable[[Cut], np.ndarray]
 
 
 @dataclass(frozen=True)

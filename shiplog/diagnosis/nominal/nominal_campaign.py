@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -100,8 +100,8 @@ class Campaign:
         for gram, rows in zip(self.each, self.rows, strict=True):
             own = voyage_effects.own_numbers(gram, made.mean, deviation)
             numbers[rows] = (made.mean + own) * unit
-        weights = made.misfit.accelerations(made.nominal.cut, segments.grid(record))
-        return made.nominal.less_numbers(numbers, weights)
+        accelerations = partial(made.misfit.accelerations, g=segments.grid(record))
+        return made.nominal.less_numbers(numbers, accelerations)
 
     def prior_without(self, left_out: int, apart: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Λ [C, C] and η [C] (`campaign_prior.prior`), one nominal voyage left out; of the numbers

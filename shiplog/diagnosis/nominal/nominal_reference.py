@@ -12,12 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
 from shiplog.diagnosis.linear import linearisation, segments
-from shiplog.diagnosis.linear.linear_segments import Linear, Wide
+from shiplog.diagnosis.linear.linear_segments import Linear, Wide, acting
 from shiplog.diagnosis.linear.measurement_correction import read
 from shiplog.diagnosis.linear.parameter_layout import HELD_INFORMATION, Columns
 from shiplog.diagnosis.noise import input_misfit, part_products
@@ -99,7 +99,7 @@ class Reference:
         linear in that would look like a change."""
         if self.expected is None or self.misfit is None:
             return None
-        return self.misfit.accelerations(cut, g) @ self.expected
+        return acting(partial(self.misfit.accelerations, g=g), cut, self.expected)
 
     def allowed_distance(self, noise_factor: float, remainder: Remainder) -> Wide:
         """Allowed distance of a path, FREE √(λ² q² + p²) of the acceleration, where the process
@@ -175,7 +175,7 @@ def assume(
     each = [
         part_products.whole(
             linear.pick(linear.cut.voyage == v), noise, columns.unit,
-            accelerations=lambda cut: wrong.accelerations(cut, g),
+            accelerations=partial(wrong.accelerations, g=g),
         ).G
         for v in names
     ]  # fmt: skip

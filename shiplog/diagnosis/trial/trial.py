@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Self
 
 import numpy as np
 
 from shiplog.diagnosis.linear import linearisation, segment_nodes, segments
-from shiplog.diagnosis.linear.linear_segments import Linear, Path
+from shiplog.diagnosis.linear.linear_segments import Linear, Path, acting
 from shiplog.diagnosis.linear.measurement_correction import as_hypothesised, read
 from shiplog.diagnosis.linear.segments import SegmentGrid
 from shiplog.diagnosis.noise import discrepancy, residual_acceleration
@@ -230,7 +230,8 @@ class Trial:
         d [C], and the numbers of its own columns."""
         misfit, count = self.reference.misfit, self.reference.columns.linearised
         if misfit is not None:
-            linear = linear.less(misfit.accelerations(linear.cut, self.grid) @ d[count:])
+            by_weight = partial(misfit.accelerations, g=self.grid)
+            linear = linear.less(acting(by_weight, linear.cut, d[count:]))
         return linear, d[:count]
 
     def leave_out(self, segments_out: np.ndarray) -> Self:
