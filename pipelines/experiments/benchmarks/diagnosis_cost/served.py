@@ -206,9 +206,12 @@ def _normal(found):
 
 
 def arrays(result):
-    """Results as a list of arrays, for a file."""
+    """Results as arrays, for a file. A pass has y and its columns, which newer builds give as those
+    of the path and those of the numbers."""
     every = result if isinstance(result, tuple) else (result,)
-    return {f"a{number}": np.asarray(one) for number, one in enumerate(every)}
+    first, *others = [np.asarray(one) for one in every if one is not None]
+    joined = [np.concatenate(others, -1)] if others else []
+    return {f"a{number}": one for number, one in enumerate([first, *joined])}
 
 
 def make_windows(path, count, seed):
