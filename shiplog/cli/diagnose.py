@@ -15,6 +15,7 @@ from shiplog.exceptions import UsageError
 
 OF_ONE = {  # parameters that say nothing to a list, and where it says the same
     "run": "RUN", "voyages": "--voyages", "store": "--store", "extend": "--extend",
+    "ray": "--ray",
 }  # fmt: skip
 
 
@@ -49,6 +50,13 @@ def diagnose(
     jobs: Annotated[
         int | None,
         typer.Option(min=1, help="Ships of --list at a time; one a core unless given."),
+    ] = None,
+    ray: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="For very many voyages: this Ray cluster holds their segments.",
+        ),
     ] = None,
     json_to: JsonOption = None,
 ) -> None:
@@ -86,7 +94,7 @@ def diagnose(
 
     found = diagnose_run(
         run, Store(store), voyages or [], out, extend=extend, cause_files=cause or [],
-        switches=context.obj or ALL,
+        switches=context.obj or ALL, ray=ray,
     )  # fmt: skip
     answer(found, json_to)
     if not found.drawn:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from shiplog.diagnosis.decision_parts import ALL, Parts
 from shiplog.diagnosis.linear import segments
 from shiplog.diagnosis.residual import error_location
 from shiplog.diagnosis.trial import trial_voyages
+from shiplog.diagnosis.trial.trial import Trial
 from shiplog.diagnosis.verdict import (
     baseline_check,
     contradicted_causes,
@@ -78,8 +79,31 @@ def diagnose_run(
     extend: Path | None = None,
     cause_files: Sequence[Path] = (),
     switches: Parts = ALL,
+    ray: str | None = None,
 ) -> Diagnosis:
-    """The whole way; the `switches` say which parts of the decision act. Raises ShiplogError."""
+    """The whole way; the `switches` say which parts of the decision act. Raises ShiplogError.
+
+    ray   address of a Ray cluster that holds the segments and adds up their products; the numbers
+          are the same
+    """
+    if ray is None:
+        return _run(run_path, store, voyages, out, extend, cause_files, switches)
+    from shiplog.commands import cluster_trials  # what a diagnosis in one process does without
+
+    with cluster_trials.on_cluster(ray) as share:
+        return _run(run_path, store, voyages, out, extend, cause_files, switches, share)
+
+
+def _run(
+    run_path: Path,
+    store: Store,
+    voyages: Sequence[str],
+    out: Path,
+    extend: Path | None,
+    cause_files: Sequence[Path],
+    switches: Parts,
+    share: Callable[[Trial], Trial] = lambda trial: trial,
+) -> Diagnosis:
     began = time.time()
     check_diagnosis(out, extend)
     causes = user.load(cause_files)
@@ -102,7 +126,7 @@ def diagnose_run(
         if nominal is not None and len(segments.begins(nominal)) < NOMINAL:
             nominal = None
         campaign = Campaigns(
-            run, store, names, profile, recorded, nominal, before_effect, against, switches
+            run, store, names, profile, recorded, nominal, before_effect, against, switches, share
         )
         done = _decided(campaign, out, causes)
     else:
@@ -128,6 +152,7 @@ class Campaigns:
 
     before_effect   whether the run was trained on other voyages than these
     against         short stretches that contradict themselves
+    share           gives a trial's voyages to others, who hold them
     """
 
     run: Run
@@ -139,6 +164,7 @@ class Campaigns:
     before_effect: bool
     against: Sequence[Contradicted] = ()
     switches: Parts = ALL
+    share: Callable[[Trial], Trial] = lambda trial: trial
 
 
 def _decided(of: Campaigns, out: Path, causes: Sequence[Cause]) -> Diagnosis:
@@ -172,8 +198,9 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> Diagnosis:
         lacking = baseline_check.lacking(run, store, profile) if of.switches.baseline else ""
     barred = contradicted_causes.barred_causes(contradicted.channels(of.against), profile)
     decided = trial_decision.decide_trial(
-        run, nominal, recorded, cut, causes, lacking, reach, barred, before, profile, of.switches
-    )
+        run, nominal, recorded, cut, causes, lacking, reach, barred, before, profile, of.switches,
+        of.share,
+    )  # fmt: skip
     tried, judge = decided.trial, decided.judge
     decision, found, dropped = decided.decision, decided.gain, dict(decided.refuted)
     untested = dict(decided.untested)

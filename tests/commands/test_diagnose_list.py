@@ -194,6 +194,7 @@ def test_pictures_that_fail_are_said_and_made_again(ships, tmp_path, in_this_pro
         (("--list", "ships.csv", "--voyages", "x"), 2, "--voyages says nothing to --list"),
         (("--list", "ships.csv", "--store", "store"), 2, "--store says nothing to --list"),
         (("--list", "ships.csv", "--extend", "more"), 2, "--extend says nothing to --list"),
+        (("--list", "ships.csv", "--ray", "here"), 2, "--ray says nothing to --list"),
         (("runs/mmg", "--jobs", "2"), 2, "--jobs says nothing to one run"),
         ((), 2, "neither a RUN nor a --list"),
         (("--list", "none.csv"), 1, "none.csv does not exist"),

@@ -22,7 +22,7 @@ def fits(monkeypatch, function, slope) -> tuple[Any, list[float]]:
 
     def linearise(numbers, *_):
         asked.append(float(numbers["x"][0]))
-        linear = SimpleNamespace(e=np.zeros(1))
+        linear = SimpleNamespace(farthest=0.0)
         return SimpleNamespace(numbers=numbers, path=None, linear=linear)
 
     def fit(_trial, point, *_):
@@ -80,7 +80,7 @@ def test_numbers_of_a_fit_without_end_are_in_the_order_of_their_covariance(monke
     def linearise(numbers, *_):
         if numbers["b"][0] != 1.0:
             raise np.linalg.LinAlgError
-        return SimpleNamespace(numbers=numbers, path=None, linear=SimpleNamespace(e=np.zeros(1)))
+        return SimpleNamespace(numbers=numbers, path=None, linear=SimpleNamespace(farthest=0.0))
 
     def fit(*_):
         numbers = {"a": np.array([9.0]), "b": np.array([9.0])}

@@ -165,7 +165,7 @@ def _posterior(
 ) -> Estimate:  # fmt: skip
     """The hypothesis at a point, over λ, or at the λ of the last round where that is steady; with
     the `bend` of the last round. Raises np.linalg.LinAlgError where the path diverged."""
-    if np.abs(point.linear.e).max() > AWAY:
+    if point.linear.farthest > AWAY:
         raise np.linalg.LinAlgError("the path diverged")
     if steady and lately is not None:
         return evidence.fit(trial, point, included, lately, remainder)

@@ -14,7 +14,7 @@ import numpy as np
 
 from shiplog.diagnosis.linear.parameter_layout import HELD_INFORMATION
 from shiplog.diagnosis.noise import bounds
-from shiplog.diagnosis.noise.campaign_parts import robust_weights, squares
+from shiplog.diagnosis.noise.campaign_parts import robust_weights
 from shiplog.diagnosis.noise.remainder import CHANGE_SIZES, Remainder, noise_prior
 from shiplog.diagnosis.trial.fitted import Estimate, ExpectedEvidence, Level, Point
 from shiplog.diagnosis.trial.trial import Numbers, Trial
@@ -56,10 +56,7 @@ def robust(trial: Trial, point: Point) -> np.ndarray:
     best = top(levels(trial, point))
     ref = trial.reference
     d = best.mean[: len(ref.pull)] * ref.columns.unit
-    left, d = trial.less_misfit(point.linear, d)
-    left = replace(left, e=left.e - left.j @ d)
-    nominal = ref.process_noise
-    square = squares(left, nominal, nominal.times(best.noise_factor))
+    square = trial.squares(point, d, ref.process_noise.times(best.noise_factor))
     return robust_weights(square, trial.weight > 0.0)
 
 

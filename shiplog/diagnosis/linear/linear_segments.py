@@ -59,6 +59,11 @@ class Linear:
         if len(self.lost) != len(self.cut):
             object.__setattr__(self, "lost", np.zeros(len(self.cut), dtype=bool))
 
+    @property
+    def farthest(self) -> float:
+        """max |e| over all observations."""
+        return float(np.abs(self.e).max())
+
     def pick(self, keep: np.ndarray | slice) -> Linear:
         """Some of the segments."""
         path = Path(self.path.start[keep], self.path.acceleration[keep])

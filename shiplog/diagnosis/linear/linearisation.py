@@ -124,13 +124,26 @@ def fit_path(
     theta   θ* [C]
     about   ā [S, 3J] acceleration at the nodes that is expected of it; zero unless given
     """
-    path = path or first_path(model, theta, segments, g)
     for _ in range(rounds):
-        y, z, _ = simulated(model, theta, segments, path, g)
-        path, gained = _closer(path, segments.y - y, z, segments.used, wide, about)
+        path, gained = pull_path(model, theta, segments, g, wide, path, about)
         if gained < PULLED_NATS:
             break
-    return path
+    return path or first_path(model, theta, segments, g)
+
+
+def pull_path(
+    model: Smooth,
+    theta: np.ndarray,
+    segments: Cut,
+    g: SegmentGrid,
+    wide: Wide,
+    path: Path | None = None,
+    about: np.ndarray | None = None,
+) -> tuple[Path, float]:
+    """One round of `fit_path`, and the most nats that it is expected to gain in a segment."""
+    path = path or first_path(model, theta, segments, g)
+    y, z, _ = simulated(model, theta, segments, path, g)
+    return _closer(path, segments.y - y, z, segments.used, wide, about)
 
 
 def predict_path(

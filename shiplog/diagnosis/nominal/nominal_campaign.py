@@ -65,6 +65,11 @@ class Campaign:
     rows: tuple[np.ndarray, ...]
     weight: np.ndarray
 
+    def without_nominal(self) -> Campaign:
+        """All but its segments and their products, which a trial's segments do not need."""
+        reference = replace(self.reference, nominal=None)
+        return replace(self, reference=reference, each=(), rows=(), weight=np.zeros(0))
+
     @cached_property
     def parts(self) -> tuple[np.ndarray, ...]:
         """`each` with every part's own numbers b ~ N(0, D) integrated out (`reduced`)."""

@@ -19,7 +19,7 @@ from shiplog.diagnosis.linear.linear_segments import Linear, Path, acting
 from shiplog.diagnosis.linear.measurement_correction import as_hypothesised, read
 from shiplog.diagnosis.linear.segments import SegmentGrid
 from shiplog.diagnosis.noise import discrepancy, residual_acceleration
-from shiplog.diagnosis.noise.campaign_parts import PART, parts_of
+from shiplog.diagnosis.noise.campaign_parts import PART, parts_of, squares
 from shiplog.diagnosis.noise.discrepancy import Discrepancy
 from shiplog.diagnosis.noise.likelihood import ProcessNoise
 from shiplog.diagnosis.noise.remainder import LEAST_SPREAD, Remainder
@@ -150,7 +150,7 @@ class Trial:
         wide = ref.wide
         if noise_factor is not None:
             wide = ref.allowed_distance(noise_factor, remainder or Remainder())
-        cut, _, _ = self._reading(numbers)
+        cut, _, _ = self.reading(numbers)
         whole = np.concatenate((ref.theta, ref.columns.numbers(dict(numbers))))
         about = ref.expected_acceleration(cut, self.grid)
         if isinstance(near, Point):
@@ -165,15 +165,24 @@ class Trial:
 
     def linearise_about(self, numbers: Numbers, path: Path) -> Point:
         """The trial linearised with these numbers about this very path. Raises as `linearise`."""
+        return self._refuse_divergent(Point(numbers, path, self.linear_at(numbers, path)))
+
+    def linear_at(self, numbers: Numbers, path: Path) -> Linear:
+        """The same, wherever the model diverges."""
         ref = self.reference
-        cut, moved, observed = self._reading(numbers)
+        cut, moved, observed = self.reading(numbers)
         whole = np.concatenate((ref.theta, ref.columns.numbers(dict(numbers))))
-        linear = linearisation.linear(
+        return linearisation.linear(
             ref.model, whole, cut, self.grid, path, moved, observed, ref.wide
         )
-        return self._refuse_divergent(Point(numbers, path, linear))
 
-    def _reading(self, numbers: Numbers) -> Read:
+    def squares(self, point: Point, d: np.ndarray, process_noise: ProcessNoise) -> np.ndarray:
+        """χ²_s = rᵀ C_s⁻¹ r [S] of what is left, r = e - W w - J d, of numbers and weights d."""
+        left, d = self.less_misfit(point.linear, d)
+        left = replace(left, e=left.e - left.j @ d)
+        return squares(left, self.reference.process_noise, process_noise)
+
+    def reading(self, numbers: Numbers) -> Read:
         """The segments as read with these numbers, and the effects of all of them on the inputs
         and size of the discrepancy.
 

@@ -7,8 +7,11 @@ with totals and volumes. Products are made part by part and added voyage by voya
 
 from __future__ import annotations
 
+import itertools
+import operator
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 from weakref import ref
 
 import numpy as np
@@ -25,6 +28,7 @@ from shiplog.diagnosis.nominal.nominal_campaign import Campaign
 from shiplog.diagnosis.trial.cache import Cache, Total
 from shiplog.diagnosis.trial.fitted import Point
 
+VOYAGES = 8  # of a block: their matrices are added before those of the others
 KEPT_PASSES = 2  # of the first point and the last one, 0.2 MB a segment each
 KEPT_TOTALS = 24  # 0.7 MB each; one point needs about a dozen levels, and again with each family
 
@@ -102,13 +106,31 @@ class Products:
         return None
 
     def _added(self, point: Point, noise: float, weight: np.ndarray, remainder: Remainder) -> Total:
-        """As `total`, added voyage by voyage."""
-        whole = np.zeros((1 + len(self._deviation(remainder)),) * 2)
-        logdet = sum(one.logdet for one in self._passes(point, weight))
-        for _, one in self._voyages(point, noise, weight, remainder):
-            whole += one.G
-            logdet += one.volume
-        return Total(whole, logdet)
+        """As `total`, worked out. Added block by block: so it is the same to the last bit where
+        blocks are added elsewhere (`blocks`)."""
+        volumes: list[float] = []
+
+        def in_blocks() -> Iterator[tuple[int, np.ndarray]]:
+            for of, one in self.each_voyage(point, noise, weight, remainder):
+                volumes.append(one.volume)
+                yield block_of[of], one.G
+
+        block_of = self._block_of
+        return Total(add_in_blocks(in_blocks()), sum(volumes, sum(self.logdets(point, weight))))
+
+    @property
+    def blocks(self) -> list[list[Any]]:
+        """Voyages in their order, VOYAGES at a time."""
+        every = list(dict.fromkeys(self.voyage.tolist()))
+        return [every[at : at + VOYAGES] for at in range(0, len(every), VOYAGES)]
+
+    @property
+    def _block_of(self) -> dict[Any, int]:
+        return {of: number for number, block in enumerate(self.blocks) for of in block}
+
+    def logdets(self, point: Point, weight: np.ndarray) -> list[float]:
+        """log|C₀| of each part (`part_products`)."""
+        return [one.logdet for one in self._passes(point, weight)]
 
     def leave_out(
         self, point: Point, noise: float, weight: np.ndarray, remainder: Remainder,
@@ -126,15 +148,28 @@ class Products:
         )
         if not whole or len(gone) == len(set(self.voyage)):
             return self.total(point, noise, np.where(left_out, 0.0, weight), remainder).G
+        return self._without(point, noise, weight, remainder, gone)
+
+    def _without(
+        self, point: Point, noise: float, weight: np.ndarray, remainder: Remainder, gone: set
+    ) -> np.ndarray:
+        """Σ_v G_v of the voyages that are not `gone`, block by block."""
+        kept, block_of = self.kept_voyages(point, noise, weight, remainder), self._block_of
+        return add_in_blocks((block_of[of], G) for of, G in kept.items() if of not in gone)
+
+    def kept_voyages(
+        self, point: Point, noise: float, weight: np.ndarray, remainder: Remainder
+    ) -> dict[object, np.ndarray]:
+        """G_v of each voyage; those of the last point and noise that they were asked for stay."""
         key = (noise, weight.tobytes(), remainder)
         kept = self.cache.voyages
         if kept is None or kept[0]() is not point.path or kept[1] != key:
-            every = self._voyages(point, noise, weight, remainder)
+            every = self.each_voyage(point, noise, weight, remainder)
             voyages = {of: one.G for of, one in every}
             self.cache.voyages = kept = (ref(point.path), key, voyages)
-        return _sum([G for of, G in kept[2].items() if of not in gone])
+        return kept[2]
 
-    def _voyages(
+    def each_voyage(
         self, point: Point, noise: float, weight: np.ndarray, remainder: Remainder
     ) -> Iterator[tuple[object, Gram]]:
         """G of each voyage with b_k and c_v integrated out (4), and its share of log|R| (5) but for
@@ -164,6 +199,17 @@ class Products:
         return self.cache.volumes[key]
 
 
-def _sum(each: Iterable[np.ndarray]) -> np.ndarray:
+def add_in_blocks(each: Iterable[tuple[int, np.ndarray]]) -> np.ndarray:
+    """Σ_blocks (Σ_v G_v) of block and G_v of one voyage after the other."""
+    whole: np.ndarray | None = None
+    for _, block in itertools.groupby(each, key=operator.itemgetter(0)):
+        G = add_up(one for _, one in block)
+        whole = G if whole is None else whole + G
+    assert whole is not None
+    return whole
+
+
+def add_up(each: Iterable[np.ndarray]) -> np.ndarray:
+    """The matrices added in their order."""
     first, *others = each
     return sum(others, first)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -61,15 +61,17 @@ def decide_trial(
     causes: Sequence[Cause], lacking: str, reach: Callable[[str], None] = lambda stage: None,
     barred: Mapping[str, str] | None = None, before: Windows | None = None,
     read_as: Profile | None = None, parts: Parts = ALL,
+    share: Callable[[Trial], Trial] = lambda trial: trial,
 ) -> Decided:  # fmt: skip
     """As `setup.trial_of`; `cut` are the voyages' windows, `before` those of the nominal voyages,
-    `read_as` the voyages' own profile, and `reach` is called at each stage."""
+    `read_as` the voyages' own profile, and `reach` is called at each stage. `share` gives a trial's
+    voyages to others, and returns the same trial."""
 
     def searched(numbers: Mapping[str, np.ndarray] | None = None) -> _Searched:
         made = setup.trial_of(
             run, nominal, recorded, causes, lacking, numbers, barred=barred, parts=parts
         )
-        return _searched(run, made, reach, parts, numbers)
+        return _searched(run, replace(made, trial=share(made.trial)), reach, parts, numbers)
 
     found = searched()
     if nominal is None and run.given and (numbers := found.numbers):

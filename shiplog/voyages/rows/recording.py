@@ -6,6 +6,7 @@ smaller than that. So the diagnosis reads the recorded rows themselves.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -106,14 +107,18 @@ class Record:
     def smoothed(self, seconds: float) -> Record:
         """The state averaged twice over so many seconds about each row, over fewer at the ends of a
         stretch."""
-        at = np.arange(len(self))
-        half = np.minimum(round(0.5 * seconds / self.step), at - self.firsts)
-        half = np.minimum(half, self.lasts - at)
-        count = (2 * half + 1)[:, None]
-        state = self.state
-        for _ in range(2):
-            upto = np.cumsum(np.pad(state, ((1, 0), (0, 0))), axis=0)
-            state = (upto[at + half + 1] - upto[at - half]) / count
+        most = round(0.5 * seconds / self.step)
+        state = np.empty_like(self.state)
+        edges = np.append(np.flatnonzero(self.starts), len(self))
+        for first, end in itertools.pairwise(edges):
+            # sums of each stretch alone: what was recorded before it does not round it
+            values, at = self.state[first:end], np.arange(end - first)
+            half = np.minimum(np.minimum(most, at), at[::-1])
+            count = (2 * half + 1)[:, None]
+            for _ in range(2):
+                upto = np.cumsum(np.pad(values, ((1, 0), (0, 0))), axis=0)
+                values = (upto[at + half + 1] - upto[at - half]) / count
+            state[first:end] = values
         return replace(self, state=state)
 
     @cached_property
