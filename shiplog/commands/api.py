@@ -249,12 +249,14 @@ def diagnose(
     out: str | Path = "diagnosis",
     extend: str | Path | None = None,
     causes: Files = (),
+    ray: str | None = None,
 ) -> Diagnosis:
     """What the model gets wrong on these voyages, why, and what the causes gain on held-out ones.
 
     out      folder for report, verdict and recording
     extend   write the model with the named causes as this run
     causes   Python files with causes of your own, which are executed
+    ray      address of a Ray cluster that holds the segments, for very many voyages
 
     Raises ShiplogError.
     """
@@ -263,8 +265,9 @@ def diagnose(
     to = None if extend is None else Path(extend)
     (path,) = _runs(run)
     return diagnosing.diagnose_run(
-        path, Store(_path(store)), _names(voyages), Path(out), extend=to, cause_files=_files(causes)
-    )
+        path, Store(_path(store)), _names(voyages), Path(out), extend=to,
+        cause_files=_files(causes), ray=ray,
+    )  # fmt: skip
 
 
 def diagnose_list(

@@ -175,6 +175,15 @@ def test_a_cluster_without_cores_is_said(trial):
         shared.linearise({})
 
 
+def test_voyages_that_end_whoever_holds_them_are_given_up(trial):
+    ray = Cluster(cores=1)
+    shared = SharedTrial.share(trial, lambda blocks: OnCluster(ray, blocks))
+    ray.dead = set(range(100))
+    with pytest.raises(ShiplogError, match="ended while they held the same voyages"):
+        shared.linearise({})
+    assert len(ray.made) < 20
+
+
 def test_the_actors_of_a_trial_end_before_those_of_the_next(trial, monkeypatch):
     ray = Cluster(cores=1)
     ray.shutdown = lambda: ray.dead.add("shut down")

@@ -7,6 +7,7 @@ the actors that are left, which work out the same again (`blocks`).
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -21,6 +22,7 @@ from shiplog.diagnosis.trial.blocks import (
 from shiplog.exceptions import ShiplogError
 
 PATIENCE_S = 2.0  # between two looks at the cluster
+MOST_LOSSES = 4  # actors that one question may cost with the same block: it is then the block
 ONE_THREAD = "1"  # of XLA, as of every command: the same numbers on every node
 
 
@@ -52,19 +54,24 @@ class OnCluster:
             self._give(number, self._actors[number % len(self._actors)])
 
     def answer(self, call: Call) -> list[Any]:
-        """As `Holders.answer`. Raises ShiplogError where no core of the cluster is left."""
+        """As `Holders.answer`. Raises ShiplogError where no core of the cluster is left, or a
+        block ends whoever holds it."""
         answers: dict[int, Any] = dict.fromkeys(call.kept)
         waiting = {
             self._ask(number, call, self._sent[number].first(kept)): number
             for number, kept in call.kept.items()
         }
+        losses: Counter[int] = Counter()
         while waiting:
             done, _ = self._ray.wait(list(waiting), timeout=PATIENCE_S)
             for reference in done:
                 number = waiting.pop(reference)
                 try:
                     said = self._ray.get(reference)
-                except self._ray.exceptions.RayActorError:
+                except self._ray.exceptions.RayActorError as error:
+                    losses[number] += 1
+                    if losses[number] > MOST_LOSSES:
+                        raise _too_large(losses[number], error) from error
                     self._replace(self._with[number], number)
                     said = Missing()
                 if isinstance(said, Missing):
@@ -101,3 +108,11 @@ class OnCluster:
 
     def _cores(self) -> int:
         return int(self._ray.cluster_resources().get("CPU", 0))
+
+
+def _too_large(losses: int, error: Exception) -> ShiplogError:
+    words = " ".join(str(error).split())[:200]
+    return ShiplogError(
+        f"{losses} processes of the Ray cluster ended while they held the same voyages: {words}",
+        hint="if that is want of memory, start nodes with more of it, or fewer cores to a node.",
+    )
