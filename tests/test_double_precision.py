@@ -90,7 +90,7 @@ def hosted(folder, program=HOST, **variables):
 
 def test_a_host_in_single_precision_stays_so_while_shiplog_computes_in_double(tmp_path):
     """And what shiplog compiles, but not what its host does, is kept for the next process."""
-    by_jax = {"SHIPLOG_KERNEL": "none"}
+    by_jax = {"SHIPLOG_KERNEL": "off"}
     hosted(tmp_path)  # by kernels
     first, again = hosted(tmp_path, **by_jax), hosted(tmp_path, **by_jax)
     assert int(first) >= 3  # functions: rollouts with derivatives, normal equations, accelerations
@@ -99,7 +99,7 @@ def test_a_host_in_single_precision_stays_so_while_shiplog_computes_in_double(tm
 
 def test_a_host_with_a_folder_of_its_own_for_compiled_functions_keeps_it(tmp_path):
     own = {"JAX_COMPILATION_CACHE_DIR": str(tmp_path / "own")}
-    own |= {"JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0", "SHIPLOG_KERNEL": "none"}
+    own |= {"JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0", "SHIPLOG_KERNEL": "off"}
     assert int(hosted(tmp_path, **own)) == 0
     assert len(list((tmp_path / "own").glob("*-cache"))) >= 3
 
@@ -124,5 +124,6 @@ def test_a_host_that_imports_jax_later_finds_jaxs_own_settings(tmp_path):
 def test_what_is_of_the_whole_process_is_set_by_the_command_alone(switch):
     sources = (ROOT / "shiplog").rglob("*.py")
     found = [path.name for path in sources if switch in path.read_text(encoding="utf-8")]
-    # and for the processes that a queue of trainings or diagnoses starts
-    assert sorted(found) == (["process.py", "queue.py"] if switch == '"NPROC"' else [])
+    # and for the processes that a queue, or a cluster, starts for it
+    own = ["cluster_blocks.py", "process.py", "queue.py"]
+    assert sorted(found) == (own if switch == '"NPROC"' else [])

@@ -12,7 +12,8 @@ from pathlib import Path
 LIMIT = 400_000_000  # bytes: some forty ships' compiled equations and campaigns
 FOLDERS = {  # folder: what is kept in it
     "jax": "machine code of compiled functions",
-    "traced": "traced equations of ships",
+    "kernels": "machine code of ships' equations",
+    "traced": "traced equations of ships that have no kernel",
     "settled": "posteriors of nominal campaigns",
     "faults": "traces of unexpected faults",
 }

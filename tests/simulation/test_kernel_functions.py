@@ -2,6 +2,7 @@
 
 import math
 from fractions import Fraction
+from types import SimpleNamespace
 
 import jax
 import jax.numpy as jnp
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from shiplog.machine.jit_cache import double
-from shiplog.simulation.kernel import elementary, kinds, machine_code
+from shiplog.simulation.kernel import elementary, machine_code
 from shiplog.simulation.kernel.derivatives import gradients
 from shiplog.simulation.kernel.from_jaxpr import Reader, UnknownOperation, trace
 from shiplog.simulation.kernel.functions import Functions
@@ -21,10 +22,8 @@ LEVELS = [one.name for one in machine_code.LEVELS]
 
 
 def has(name: str) -> bool:
-    try:
-        return machine_code.level(name) is not None
-    except ValueError:
-        return False
+    found = machine_code.level(name)
+    return found is not None and found.name == name
 
 
 @pytest.fixture(params=[pytest.param(n, marks=pytest.mark.skipif(
@@ -231,8 +230,23 @@ def test_equal_operations_are_one_and_what_is_known_is_computed():
     assert not g.varies[g.mul(fixed, two)] and g.varies[g.mul(fixed, x)]
 
 
-def test_a_level_that_the_processor_lacks_or_nobody_knows_is_refused():
-    with pytest.raises(ValueError, match="not one of"):
-        machine_code.level("avx1024")
-    assert machine_code.level("none") is None
-    assert kinds.pointer(np.zeros(3))
+def test_a_level_that_nobody_knows_is_the_processors_and_off_is_none(monkeypatch):
+    assert machine_code.level("avx1024") == machine_code.level("avx512") == machine_code.level()
+    assert machine_code.level("off") is None
+    lacking = SimpleNamespace(get_host_cpu_features=lambda: {"avx2": True, "fma": True, "bmi2": 1})
+    monkeypatch.setattr(machine_code, "_llvm", lambda: lacking)
+    machine_code.level.cache_clear()
+    assert [machine_code.level(n).name for n in ("avx512", "avx2", "portable")] == [
+        "avx2", "avx2", "portable",
+    ]  # fmt: skip
+    machine_code.level.cache_clear()
+
+
+def test_without_llvm_jax_runs_the_models_and_that_is_said(monkeypatch, caplog):
+    def missing():
+        raise ImportError("no llvmlite")
+
+    monkeypatch.setattr(machine_code, "_llvm", missing)
+    machine_code.level.cache_clear()
+    assert machine_code.level() is None and "no llvmlite" in caplog.text
+    machine_code.level.cache_clear()

@@ -14,6 +14,7 @@ from typing import Any
 import jax
 import numpy as np
 from jax import Array
+from jax.extend import core
 
 from shiplog.simulation.kernel.graph import Graph, UnknownOperation
 
@@ -142,7 +143,7 @@ def _inner(params: Any) -> Any:
     for key in ("jaxpr", "call_jaxpr", "fun_jaxpr"):
         inner = params.get(key)
         if inner is not None:
-            return inner if hasattr(inner, "consts") else jax.extend.core.ClosedJaxpr(inner, ())
+            return inner if hasattr(inner, "consts") else core.ClosedJaxpr(inner, ())
     return None
 
 

@@ -79,6 +79,7 @@ def aligned(*shape: int) -> np.ndarray:
 
 _known: dict[Any, Kernel | None] = {}
 _refused: set[str] = set()
+_jaxprs: dict[Any, Any] = {}  # of the kind that was traced last
 
 
 def kernel(model: Any, purpose: Purpose, driven: int, coefficients: int) -> Kernel | None:
@@ -210,15 +211,20 @@ def traced(
     from shiplog.simulation.kernel.windows import STATES
 
     leaves, structure = trees.flatten(model)
-    shapes = [np.shape(leaf) for leaf in leaves]
-
-    def acceleration(theta, state, actuator, wind, *numbers):
-        return trees.unflatten(structure, numbers).acceleration(theta, state, actuator, wind)
-
+    shapes = tuple(np.shape(leaf) for leaf in leaves)
     actuators = driven - 2
-    closed = from_jaxpr.trace(
-        acceleration, (coefficients,), (STATES,), (actuators,), (2,), *shapes
-    )  # fmt: skip
+    key = structure, shapes, driven, coefficients
+    if key not in _jaxprs:  # the purposes of a kind follow one another
+
+        def acceleration(theta, state, actuator, wind, *numbers):
+            whole = trees.unflatten(structure, numbers)
+            return whole.acceleration(theta, state, actuator, wind)
+
+        _jaxprs.clear()
+        _jaxprs[key] = from_jaxpr.trace(
+            acceleration, (coefficients,), (STATES,), (actuators,), (2,), *shapes
+        )
+    closed = _jaxprs[key]
     x = [g.varying(i) for i in range(STATES + driven)]
     given, at = [], 0
     for shape in (*shapes, (coefficients,)):

@@ -24,7 +24,7 @@ from shiplog.machine import disk_cache, files
 log = logging.getLogger(__name__)
 
 FOLDER = "kernels"
-LEVEL = "SHIPLOG_KERNEL"  # environment: one of LEVELS, or "none": JAX then runs the models
+LEVEL = "SHIPLOG_KERNEL"  # environment: one of LEVELS, or "off": JAX then runs the models
 FORM = 1  # of the files
 
 
@@ -60,22 +60,20 @@ def _llvm() -> Any:
 
 @lru_cache
 def level(wanted: str | None = None) -> Level | None:
-    """The best that this processor has, or the one that LEVEL in the environment names; None for
-    "none". Raises ValueError for another name, or for one that the processor does not have."""
-    wanted = wanted or os.environ.get(LEVEL) or None
-    if wanted == "none":
+    """The best that this processor has, or the one that the environment's LEVEL names, where the
+    processor has it. None where that is "off", or LLVM cannot be loaded."""
+    wanted = wanted or os.environ.get(LEVEL, "")
+    if wanted == "off":
         return None
-    names = [one.name for one in LEVELS]
-    if wanted is not None and wanted not in names:
-        raise ValueError(f"{LEVEL} is {wanted!r}, and not one of {', '.join(names)}, none.")
-    has = _llvm().get_host_cpu_features()
+    try:
+        has = _llvm().get_host_cpu_features()
+    except (ImportError, OSError, RuntimeError) as error:
+        log.warning("JAX runs all models: LLVM cannot be loaded (%s).", error)
+        return None
     fitting = [one for one in LEVELS if all(has.get(feature) for feature in one.needs)]
-    if wanted is None:
-        return fitting[0]
-    found = next((one for one in fitting if one.name == wanted), None)
-    if found is None:
-        raise ValueError(f"{LEVEL} is {wanted!r}, which this processor does not have.")
-    return found
+    names = [one.name for one in LEVELS]
+    at = names.index(wanted) if wanted in names else 0
+    return next(one for one in fitting if names.index(one.name) >= at)
 
 
 def compiled(text: str, of: Level) -> bytes:
@@ -147,7 +145,7 @@ def keep(key: str, facts: dict[str, Any], code: bytes) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         with files.whole(path) as partial:
             partial.write_bytes(json.dumps(head).encode() + b"\n" + code)
-        disk_cache.trim_when_done()
+        disk_cache.trim()
     except OSError as error:
         log.warning("A kernel could not be kept, so that it is made again next time: %s", error)
 
