@@ -290,3 +290,22 @@ def test_what_is_beyond_the_ship_costs_evidence_and_is_moved(trial, monkeypatch)
     assert bound.value - free.value == pytest.approx(wanted)
     moved, _ = evidence.numbers_of(trial, bound, point, included)
     assert abs(moved["two"][1]) == pytest.approx(farthest * abs(moved["two"][0]))
+
+
+@pytest.mark.parametrize("kind", (NOMINAL, "position"))
+def test_the_volume_of_the_first_point_is_that_of_its_products(made, kind):
+    """Of the columns that deviate, some do not; asked before its products and after them."""
+    nominal, record, given = made
+    deviation = nominal.effects.deviation.copy()
+    deviation[::3] = 0.0
+    effects = replace(nominal.effects, deviation=deviation)
+    trial = straight.trial(replace(nominal, effects=effects), record, given)
+    weight, remainder = np.linspace(0.3, 1.0, 8), Remainder(kind)
+    volume = trial.products.volume(trial.first, 1.5, weight, remainder)
+    total = trial.products.total(trial.first, 1.5, weight, remainder)
+    assert volume == pytest.approx(total.volume, rel=1e-12)
+    after = trial.products.volume(trial.first, 2.0, weight, remainder)
+    assert after == pytest.approx(
+        trial.products.total(trial.first, 2.0, weight, remainder).volume, rel=1e-12
+    )
+    assert after - volume > 10.0

@@ -28,6 +28,7 @@ from shiplog.diagnosis.hypotheses.weighing import SEARCH_NATS, CauseSet, weigh, 
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED
 from shiplog.diagnosis.trial.fitted import ExpectedEvidence, Fit, Point
 from shiplog.diagnosis.trial.trial import Trial
+from shiplog.machine import memory
 from shiplog.models.causes import Cause
 
 MOST_CAUSES = 5  # of a hypothesis; of a ship with more the given coefficients are another ship's
@@ -129,6 +130,7 @@ class Search:
             gained = table.found[labels, NOMINAL].evidence - table.nothing.evidence
             table.alone[label] = max(gained, table.alone.get(label, -math.inf))
         table.found = shortened(table.found, [table.nothing, *table.ranked()])
+        memory.give_back()
 
     def _weigh_again(self, labels: tuple[str, ...], one: Hypothesis, fit: Fit) -> None:
         """A set with one cause less than the best hypothesis, with that one's noise: it may have

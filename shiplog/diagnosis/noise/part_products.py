@@ -20,7 +20,7 @@ All is in units of the numbers. A part is small, so that a campaign may have any
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import get_blas_funcs
@@ -50,6 +50,11 @@ class PartPass:
     weight: np.ndarray
     rows: np.ndarray
     logdet: float
+
+    def of_columns(self, columns: np.ndarray) -> PartPass:
+        """Some of its columns, in order."""
+        total = self.total[np.ix_(columns, columns)]
+        return replace(self, total=total, across=np.take(self.across, columns, axis=-1))
 
     def gram(self, prior: InverseKernels, first: int | None = None) -> Gram:
         """G, of the `first` columns or of all, and its volume; Q⁻¹ is the `prior` of all segments

@@ -174,6 +174,13 @@ class Block:
         assert G is not None
         return Sum(G, tuple(logdets), tuple(volumes))
 
+    def volumes(
+        self, at: str, weight: str, noise: float, remainder: Remainder
+    ) -> tuple[list[float], list[float]]:
+        """Shares of log|R| of each voyage, and log|C₀| of each part."""
+        own = self._remainder(remainder)
+        return self.trial.products.volumes(self._point(at), noise, self.known[weight], own)
+
     def add_without(
         self, at: str, weight: str, noise: float, remainder: Remainder, gone: frozenset
     ) -> np.ndarray | None:

@@ -40,8 +40,9 @@ class Cache:
     starts    where fits converged, written by `evaluate.resume`
     readings  numbers of sensors' causes, and the trial as read with them: as it is, and as it was
               last; written by `Trial`. The rest is written by `Products`:
-    passes    of a point, by weights: of those that were asked for last. A point is known by its
+    passes    parts of the point that was asked for last, with its weights. A point is known by its
               path, which outlives its linearisation
+    first     the same of the first point, for its volumes
     totals    of a point, by λ, weights and shape of the process noise
     volumes   of the first point, the same: log|R|
     voyages   products of each voyage of the last point that they were asked for
@@ -50,7 +51,8 @@ class Cache:
     starts: dict[Key, Start] = field(default_factory=dict)
     readings: list[tuple[Numbers, Read]] = field(default_factory=list)
     # no id() of a point: one that is gone leaves its own to the next one
-    passes: list[tuple[ref[Path], bytes, Sequence[PartPass]]] = field(default_factory=list)
+    passes: tuple[ref[Path], bytes, Sequence[PartPass]] | None = None
+    first: tuple[ref[Path], bytes, Sequence[PartPass]] | None = None
     totals: list[tuple[ref[Path], tuple, Total]] = field(default_factory=list)
     volumes: dict[tuple, float] = field(default_factory=dict)
     voyages: tuple[ref[Path], tuple, dict[object, np.ndarray]] | None = None

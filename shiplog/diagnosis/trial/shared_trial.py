@@ -138,6 +138,14 @@ class SharedProducts(Products):
         volumes = itertools.chain.from_iterable(one.volumes for one in each)
         return Total(add_up(one.G for one in each), sum(volumes, logdet))
 
+    def _volume(
+        self, first: Point, noise: float, weight: np.ndarray, remainder: Remainder
+    ) -> float:
+        shared, known = self._known(first, weight)
+        each = shared.ask("volumes", known, noise, remainder)
+        volumes, logdets = (itertools.chain.from_iterable(one[i] for one in each) for i in (0, 1))
+        return sum(volumes, sum(logdets))
+
     def _without(
         self, point: Point, noise: float, weight: np.ndarray, remainder: Remainder, gone: set
     ) -> np.ndarray:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import operator
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 from weakref import ref
 
@@ -22,14 +22,13 @@ from shiplog.diagnosis.noise import discrepancy, part_products
 from shiplog.diagnosis.noise.discrepancy import Discrepancy
 from shiplog.diagnosis.noise.likelihood import ProcessNoise
 from shiplog.diagnosis.noise.part_products import Gram, PartPass
-from shiplog.diagnosis.noise.remainder import NOMINAL, Remainder
+from shiplog.diagnosis.noise.remainder import Remainder
 from shiplog.diagnosis.nominal import campaign_prior
 from shiplog.diagnosis.nominal.nominal_campaign import Campaign
 from shiplog.diagnosis.trial.cache import Cache, Total
 from shiplog.diagnosis.trial.fitted import Point
 
 VOYAGES = 8  # of a block: their matrices are added before those of the others
-KEPT_PASSES = 2  # of the first point and the last one, 0.2 MB a segment each
 KEPT_TOTALS = 24  # 0.7 MB each; one point needs about a dozen levels, and again with each family
 
 
@@ -50,21 +49,33 @@ class Products:
     cache: Cache
 
     def _passes(self, point: Point, weight: np.ndarray) -> Sequence[PartPass]:
-        """The point's parts without their starts, with the columns of every family."""
-        key = weight.tobytes()
-        kept = [one for one in self.cache.passes if one[0]() is not None]
-        found = next((one for one in kept if one[0]() is point.path and one[1] == key), None)
-        if found is None:
-            self.cache.passes = kept = kept[1 - KEPT_PASSES :]  # before another one is made
-            reference = self.campaign.reference
-            unit = np.append(reference.columns.unit, np.ones(self.omitted.count))
-            passes = part_products.passes(
-                point.linear, reference.process_noise, self.parts, unit, weight, self._accelerations
-            )
-            found = ref(point.path), key, tuple(passes)
-        # the one that was asked for last is the last: the first point's stays, as each level has it
-        self.cache.passes = [*(one for one in kept if one is not found), found]
-        return found[2]
+        """The point's parts without their starts, with the columns of every family: 0.2 MB a
+        segment, so that those of the last point are kept."""
+        key, kept = weight.tobytes(), self.cache.passes
+        if kept is None or kept[0]() is not point.path or kept[1] != key:
+            self.cache.passes = kept = None  # before others are made
+            made = ref(point.path), key, tuple(self._made(point, weight))
+            self.cache.passes = kept = made
+        return kept[2]
+
+    def _made(self, point: Point, weight: np.ndarray) -> Iterator[PartPass]:
+        reference = self.campaign.reference
+        unit = np.append(reference.columns.unit, np.ones(self.omitted.count))
+        return part_products.passes(
+            point.linear, reference.process_noise, self.parts, unit, weight, self._accelerations
+        )
+
+    def _passes_of_first(self, first: Point, weight: np.ndarray) -> Sequence[PartPass]:
+        """The first point's, of which volumes alone are asked: the columns that deviate."""
+        key, kept = weight.tobytes(), self.cache.first
+        if kept is None or kept[0]() is not first.path or kept[1] != key:
+            last = self.cache.passes
+            alike = last is not None and last[0]() is first.path and last[1] == key
+            columns = np.append(0, 1 + np.flatnonzero(self.campaign.effects.deviation))
+            given = last[2] if last is not None and alike else self._made(first, weight)
+            passes = tuple(one.of_columns(columns) for one in given)
+            self.cache.first = kept = ref(first.path), key, passes
+        return kept[2]
 
     def _accelerations(self, cut: Cut) -> np.ndarray:
         """Φ of the discrepancy: a weight w acts as an acceleration Φ w."""
@@ -193,10 +204,32 @@ class Products:
         with less damping would gain evidence because it amplifies the noise."""
         key = (noise_factor, weight.tobytes(), remainder.shape)
         if key not in self.cache.volumes:
-            alike = replace(remainder, kind=NOMINAL)  # a family has no deviation of its own
-            made = self._kept(first, key, 0) or self._added(first, noise_factor, weight, alike)
-            self.cache.volumes[key] = made.volume
+            kept = self._kept(first, key, 0)
+            self.cache.volumes[key] = (
+                kept.volume if kept else self._volume(first, noise_factor, weight, remainder)
+            )
         return self.cache.volumes[key]
+
+    def _volume(
+        self, first: Point, noise: float, weight: np.ndarray, remainder: Remainder
+    ) -> float:
+        volumes, logdets = self.volumes(first, noise, weight, remainder)
+        return sum(volumes, sum(logdets))
+
+    def volumes(
+        self, first: Point, noise: float, weight: np.ndarray, remainder: Remainder
+    ) -> tuple[list[float], list[float]]:
+        """Shares of log|R| of each voyage, and log|C₀| of each part. Of the columns that deviate:
+        others have no part in it."""
+        of = self.process_noise(first.linear.cut, noise, remainder)
+        prior, passes = of.inverse_kernels(self.grid.nodes), self._passes_of_first(first, weight)
+        within = self.campaign.effects.deviation
+        within = within[within > 0.0]
+        each = (one.gram(prior) for one in passes)
+        voyages = campaign_prior.each_voyage(
+            each, self.voyage, self.campaign.apart * within, within
+        )
+        return [one.volume for _, one in voyages], [one.logdet for one in passes]
 
 
 def add_in_blocks(each: Iterable[tuple[int, np.ndarray]]) -> np.ndarray:
