@@ -309,3 +309,15 @@ def test_the_volume_of_the_first_point_is_that_of_its_products(made, kind):
         trial.products.total(trial.first, 2.0, weight, remainder).volume, rel=1e-12
     )
     assert after - volume > 10.0
+
+
+def test_what_was_let_go_is_made_again(trial):
+    point, weight = trial.linearise({}), np.linspace(0.3, 1.0, 8)
+    before = trial.products.total(point, 1.2, weight, Remainder())
+    volume = trial.products.volume(trial.first, 1.2, weight, Remainder())
+    trial.cache.release()
+    assert trial.cache.passes is None and trial.cache.first is None
+    trial.cache.totals.clear()
+    trial.cache.volumes.clear()
+    assert np.array_equal(trial.products.total(point, 1.2, weight, Remainder()).G, before.G)
+    assert trial.products.volume(trial.first, 1.2, weight, Remainder()) == volume

@@ -92,6 +92,7 @@ def find_omitted_inputs(trial: Trial, nothing: Fit, whole: Linear) -> tuple[Depe
         trial.record,
     )  # fmt: skip
     nodes = residual_acceleration.table(found, trial.record)
+    trial.cache.release()
     return omitted_inputs.table(
         nodes, trial.record.profile, np.random.default_rng(0), node_step=trial.grid.node_step
     )

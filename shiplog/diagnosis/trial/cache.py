@@ -18,6 +18,7 @@ from shiplog.diagnosis.linear.segments import Cut
 from shiplog.diagnosis.noise.part_products import PartPass
 from shiplog.diagnosis.noise.remainder import Remainder
 from shiplog.diagnosis.trial.fitted import Start
+from shiplog.machine import memory
 
 Numbers = Mapping[str, np.ndarray]
 Read = tuple[Cut, Moved, np.ndarray]  # see `measurement_correction.read`
@@ -56,3 +57,9 @@ class Cache:
     totals: list[tuple[ref[Path], tuple, Total]] = field(default_factory=list)
     volumes: dict[tuple, float] = field(default_factory=dict)
     voyages: tuple[ref[Path], tuple, dict[object, np.ndarray]] | None = None
+
+    def release(self) -> None:
+        """Let go of what takes most memory, 0.4 MB a segment: it is made again where it is asked
+        for."""
+        self.passes = self.first = None
+        memory.give_back()

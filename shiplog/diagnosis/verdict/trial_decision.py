@@ -27,6 +27,7 @@ from shiplog.diagnosis.verdict.decide import decide
 from shiplog.diagnosis.verdict.held_out import HeldOut
 from shiplog.diagnosis.verdict.result import Decision
 from shiplog.exceptions import listed
+from shiplog.machine import memory
 from shiplog.models.causes import Cause
 from shiplog.ship_profile.profile import Profile
 from shiplog.simulation.error_reduction import Gain
@@ -86,7 +87,10 @@ def decide_trial(
     decision, _, gain, refuted = refutation.judge(found.search, refutes)
     if refutes is None and judge is not None and decision.named:
         gain = judge.gain(decision)
-    return Decided(trial, found.untested, found.point, judge, decision, gain, refuted)
+    untested, point = found.untested, found.point
+    del found  # the other hypotheses, before the pictures
+    trial.cache.release()
+    return Decided(trial, untested, point, judge, decision, gain, refuted)
 
 
 @dataclass(frozen=True)
@@ -112,6 +116,7 @@ def _searched(
     run: Run, made: setup.Setup, reach: Callable[[str], None], parts: Parts,
     likely: Mapping[str, np.ndarray] | None,
 ) -> _Searched:  # fmt: skip
+    memory.give_back()  # what the nominal campaign took
     trial, point = evidence.begin(made.trial, run.extension_numbers())
     log.info(
         "%s against %s: %d segments of %d s, of which a share of %.2f counts",
