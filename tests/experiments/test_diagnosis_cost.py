@@ -75,7 +75,7 @@ def test_first_and_later_cases_of_each_ship_and_verdicts_that_differ(tmp_path, m
         asked.append((build.name, label[0]))
         name = "named" if build is ours or label != "a-2" else "none"
         cost = (4.0 if first else 1.0) * (1.0 if build is ours else 5.0)
-        return Used(cost, 1024.0, {"verdict": name, "causes": []})
+        return Used(cost, 1024.0, {"verdict": name, "causes": [], "ranking": []})
 
     monkeypatch.setattr(commands, "diagnosed", diagnosed)
     monkeypatch.setattr(commands, "fresh", lambda build: emptied.append(build.name))
@@ -83,8 +83,28 @@ def test_first_and_later_cases_of_each_ship_and_verdicts_that_differ(tmp_path, m
     assert emptied == ["this", "older"] * 2
     assert (list(first.ours), list(first.theirs)) == ([4.0, 4.0], [20.0, 20.0])
     assert list(later.ours) == [1.0] * 3 and later.ratio == worst.ratio == 5.0
-    assert later.facts["verdicts_that_differ"] == ["a-2: none became named"]
+    assert later.facts["verdicts_that_differ"] == ["a-2: none () became named ()"]
+    assert later.facts["numbers_apart"] == {"a-1": 0.0, "b-1": 0.0}
     assert peak.value == 1.0
+
+
+def test_numbers_of_the_same_verdict_are_compared_in_their_intervals():
+    def answer(value, reduction=0.5, channel="gnss"):
+        speed = {"value": value, "low": value - 0.05, "high": value + 0.05, "unit": "m/s"}
+        word = {"value": channel, "low": channel, "high": channel, "unit": ""}
+        cause = {
+            "name": "current", "evidence_nats": 12.34,
+            "parameters": {"speed": speed, "channel": word},
+        }  # fmt: skip
+        ranking = [{"name": "current", "probability": 0.99}]
+        return {"verdict": "named", "causes": [cause], "ranking": ranking,
+                "gain": {"reduction": reduction}}  # fmt: skip
+
+    assert commands.apart(answer(1.0), answer(1.0)) == 0.0
+    assert commands.apart(answer(1.001), answer(1.0)) == pytest.approx(0.01)
+    assert commands.apart(answer(1.0, 0.6), answer(1.0)) == pytest.approx(0.2)
+    assert commands.apart(answer(1.0), answer(1.0, channel="wind")) == np.inf
+    assert commands.weighed(answer(1.0)) == "named current (current 12.3 nats, current 0.990)"
 
 
 def test_a_store_and_a_run_become_readable_for_a_build_that_knows_less(tmp_path, monkeypatch):

@@ -62,6 +62,8 @@ def main() -> int:
     for row in rows:
         for changed in row.facts.get("verdicts_that_differ", ()):
             print(f"another verdict: {changed}")
+        for label, away in row.facts.get("numbers_apart", {}).items():
+            print(f"{label}: the same verdict, its numbers at most {away:.1e} of an interval apart")
     return 1 if any(row.holds is False for row in rows) else 0
 
 

@@ -43,6 +43,7 @@ def trials(
     first: list[list[Used]] = [[], []]
     later: list[list[Used]] = [[], []]
     changed: list[str] = []
+    away: dict[str, float] = {}  # case → largest difference of a number of the same verdict
     builds = [build for build in (ours, older) if build is not None]
 
     def measure(case: Case, into: list[list[Used]], turn: int) -> None:
@@ -53,9 +54,12 @@ def trials(
             found[build.name] = diagnosed(build, place, case.voyages, scratch)
         for number, build in enumerate(builds):
             into[number].append(found[build.name])
-        said = [_verdict(found[build.name].answer) for build in builds]
-        if len(said) > 1 and said[0] != said[1]:
-            changed.append(f"{case.label}: {said[1]} became {said[0]}")
+        if len(builds) > 1:
+            own, other = (found[build.name].answer for build in builds)
+            if _verdict(own) != _verdict(other):
+                changed.append(f"{case.label}: {weighed(other)} became {weighed(own)}")
+            else:
+                away[case.label] = apart(own, other)
 
     turn = 0
     for ship in dict.fromkeys(case.ship for case in cases):
@@ -69,7 +73,10 @@ def trials(
                 measure(case, later, turn)
         turn += 1
     what = f"diagnose, {TRIAL_S} s"
-    facts = {"cases": [case.label for case in cases], "verdicts_that_differ": sorted(set(changed))}
+    facts = {
+        "cases": [case.label for case in cases], "verdicts_that_differ": sorted(set(changed)),
+        "numbers_apart": away,
+    }  # fmt: skip
 
     def seconds(of: list[list[Used]]) -> tuple[list[float], list[float]]:
         return [one.cpu_s for one in of[0]], [one.cpu_s for one in of[1]]
@@ -85,6 +92,37 @@ def trials(
 def _verdict(answer: dict) -> str:
     causes = "+".join(sorted(cause["name"] for cause in answer["causes"]))
     return f"{answer['verdict']} {causes}".strip()
+
+
+def weighed(answer: dict) -> str:
+    """The verdict, with the log Bayes factor of each named cause and the likeliest answers."""
+    nats = [
+        f"{one['name']} {value:.1f} nats"
+        for one in answer["causes"]
+        if (value := one.get("evidence_nats")) is not None
+    ]
+    likely = [f"{one['name']} {one['probability']:.3f}" for one in answer["ranking"][:3]]
+    return f"{_verdict(answer)} ({', '.join(nats + likely)})"
+
+
+def apart(one: dict, other: dict) -> float:
+    """Largest difference of a parameter of the named causes, of its 90 % interval, and of the gain
+    by its own size."""
+
+    def gain(of: dict) -> float:
+        return of["gain"]["reduction"] if "gain" in of else 0.0
+
+    found = [abs(gain(one) - gain(other)) / max(abs(gain(other)), 1e-3)]
+    theirs = {cause["name"]: cause["parameters"] for cause in other["causes"]}
+    for cause in one["causes"]:
+        for name, own in cause["parameters"].items():
+            known = theirs[cause["name"]][name]
+            if isinstance(own["value"], str):
+                found.append(0.0 if own["value"] == known["value"] else float("inf"))
+                continue
+            width = max(known["high"] - known["low"], 1e-12)
+            found += [abs(own[key] - known[key]) / width for key in ("value", "low", "high")]
+    return max(found)
 
 
 def given(ours: Build, older: Build | None, case: Case, scratch: Path, share: float) -> Row:
