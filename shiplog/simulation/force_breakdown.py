@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import polars as pl
 
+from shiplog.machine.arrays import double
 from shiplog.nomenclature.channels import STATE
 from shiplog.ship_profile.profile import Profile
 from shiplog.simulation.sensitivities import Simulator
@@ -22,7 +23,7 @@ def break_down(simulator: Simulator, seconds: pl.DataFrame, profile: Profile) ->
         blowing = true_wind(state, seconds.select(profile.wind_names).to_numpy())
     else:
         blowing = np.zeros((seconds.height, 2))
-    with np.errstate(all="ignore"):
+    with double(), np.errstate(all="ignore"):
         parts = simulator.model.forces(simulator.theta, state, actuator, blowing)
     found = {name: np.asarray(force) for name, force in parts.items()}
     found["total"] = sum(found.values())
