@@ -2,6 +2,7 @@
 of the user's own; and what becomes of a kernel that cannot be made, read or kept."""
 
 import logging
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -216,6 +217,19 @@ def test_a_window_is_what_it_is_whoever_stands_next_to_it():
         one = WindowSeries(*(values[i : i + 1] for values in data))
         alone = sensitivities.linearised(model, theta, one)
         assert all(np.array_equal(a[0], w[i]) for a, w in zip(alone, whole, strict=True))
+
+
+def test_threads_change_no_bit():
+    """Nor does it matter which of them is the first to ask for a kernel."""
+    model, theta, actuators = MODELS["esso-osaka"]()
+    data = sailing(actuators, count=21)
+    wanted = sensitivities.normal(model, theta, data)
+    kinds._known.clear()
+    with ThreadPoolExecutor(4) as threads:
+        each = threads.map(lambda _: sensitivities.normal(model, theta, data), range(12))
+        for found in each:
+            assert np.array_equal(found.gram, wanted.gram)
+            assert np.array_equal(found.pull, wanted.pull)
 
 
 def test_memory_of_an_earlier_call_is_used_again_and_no_other():
