@@ -106,7 +106,7 @@ def evaluate(
     last: _Iterate | None = None  # that was accepted
     best: _Iterate | None = None
     halvings, damping = 0, 1.0  # of a step; it grows back once steps are accepted
-    bend = 0.0  # of the evidence over log λ, once it is known
+    bend = start.bend  # of the evidence over log λ; zero until it is known
     steady = with_force  # whether the process noise has converged: a round then keeps it
     for _ in range(RELINEARISATIONS):
         try:

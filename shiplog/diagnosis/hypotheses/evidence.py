@@ -16,6 +16,7 @@ from shiplog.diagnosis.linear.parameter_layout import HELD_INFORMATION
 from shiplog.diagnosis.noise import bounds
 from shiplog.diagnosis.noise.campaign_parts import robust_weights
 from shiplog.diagnosis.noise.remainder import CHANGE_SIZES, Remainder, noise_prior
+from shiplog.diagnosis.nominal.voyage_effects import inverse_and_volume
 from shiplog.diagnosis.trial.fitted import Estimate, ExpectedEvidence, Level, Point
 from shiplog.diagnosis.trial.trial import Numbers, Trial
 from shiplog.models.causes import Cause
@@ -91,16 +92,18 @@ def solve(
     G      [1 + C, 1 + C]  [r J]ᵀ R⁻¹ [r J] over all C columns of the trial; H are N of them
     log_R  log|R|
     noise  λ, of which G and log|R| are
+
+    Raises np.linalg.LinAlgError where A is not positive definite.
     """
     c = trial.reference.counts
     chosen = np.append(0, 1 + _columns(trial, included, remainder))
     G = (c * G)[np.ix_(chosen, chosen)]
     prior = _prior(trial, point, included, remainder)
     A, b = G[1:, 1:] + prior.P_inv, G[1:, 0] + prior.P_inv_mu
-    A_inv = np.linalg.inv(A)
+    A_inv, log_A = inverse_and_volume(A)
     mean = A_inv @ b
     square = G[0, 0] + prior.square - b @ mean
-    log_S = np.linalg.slogdet(A)[1] - prior.log_P_inv
+    log_S = log_A - prior.log_P_inv
     return Level(noise, G, A_inv, mean, -0.5 * float(square + log_S + c * log_R))
 
 

@@ -69,7 +69,7 @@ class CauseSet:
 
     def fit(self, fit: Fit, remainder: Remainder, anew: bool = False) -> Fit:
         """These causes with another remainder, from the numbers and path of a fit."""
-        start = Start(fit.estimate.numbers, fit.point.path)
+        start = Start(fit.estimate.numbers, fit.point.path, bend=fit.estimate.bend)
         return resume(self.trial, self.included, remainder, start, anew=anew)
 
     def hypothesis(self, fit: Fit, force: SideForce | None = None) -> Hypothesis:
@@ -120,7 +120,8 @@ class Rough:
     def fit(self, level: Level, remainder: Remainder | None = None) -> Fit:
         """The set at one of its levels, under this remainder or another one of the same noise."""
         numbers = evidence.numbers_of(self.of.trial, level, self.point, self.of.included)
-        found = Estimate("+".join(self.of.labels), level.value, level.noise_factor, *numbers)
+        name, noise = "+".join(self.of.labels), level.noise_factor
+        found = Estimate(name, level.value, noise, *numbers, bend=level.bend)
         return Fit(self.point, found, remainder or self.remainder)
 
 

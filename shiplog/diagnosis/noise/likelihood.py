@@ -148,8 +148,10 @@ class Whitening:
         at = process_noise.bin * np.arange(bins)
         self.by: list[np.ndarray] = []  # [S, B, B] of each channel
         self.logdet = 2.0 * float((used * np.log(process_noise.noise)).sum())
+        alike = bool((used == used[..., :1]).all())  # what is measured is measured in all channels
         for channel in range(6):
-            patterns, of = np.unique(used[..., channel], axis=0, return_inverse=True)
+            if channel == 0 or not alike:
+                patterns, of = np.unique(used[..., channel], axis=0, return_inverse=True)
             correlation = correlation_of_noise(
                 process_noise.coloured[channel], process_noise.fade[channel], at
             )
@@ -200,7 +202,7 @@ def weighed(
     else:
         E *= np.sqrt(weight)[:, None, None]
         rows = E.reshape(-1, E.shape[-1])
-        dd = rows.T @ rows
+        dd = rows.T @ rows  # of a matrix and its own transpose numpy makes one half
     return Weighed(dd, zd, zz, white.logdet, nodes)
 
 

@@ -69,11 +69,13 @@ class Start:
     numbers       label → numbers, SI
     path          to start from, or a point whose linearisation predicts it; None without any
     noise_factor  λ at which an earlier fit of them converged; None without any
+    bend          of the evidence over log λ in a fit that this one follows; zero without any
     """
 
     numbers: Mapping[str, np.ndarray]
     path: Path | Point | None
     noise_factor: float | None = None
+    bend: float = 0.0
 
 
 @dataclass(frozen=True)
