@@ -18,16 +18,15 @@ E = [e | J] where J has the columns Zₐ Φ_s behind those of J_s:
 Three eliminations give G_s, each exact:
 
     1  instruments   E ← R^-½ E,  Z ← R^-½ Z, and their products              `likelihood.weighed`
-    2  start         F = Z₀ᵀ Z₀;  Xᵀ X ← Xᵀ X - Xᵀ Z₀ (F + P₀⁻¹)⁻¹ Z₀ᵀ X  of X = (E | Zₐ)
-                                                                            `likelihood.startless`
-    3  nodes         Q = L Lᵀ,  Lᵀ Zₐᵀ Zₐ L = U diag(f) Uᵀ,  modes Uᵀ L⁻¹ a ~ N(0, λ² I):
-                     G(λ) = Eᵀ E - Mᵀ diag(1 / (f + λ⁻²)) M,  M = Uᵀ Lᵀ Zₐᵀ E
-                                                                `likelihood.modes`, `Modes.gram`
+    2  start         C₀ = R + Z₀ P₀ Z₀ᵀ,  F = Z₀ᵀ Z₀,  of X = (E | Zₐ)
+                     Xᵀ C₀⁻¹ X = Xᵀ X - Xᵀ Z₀ (F + P₀⁻¹)⁻¹ Z₀ᵀ X           `likelihood.start_of`
+    3  nodes         A = Zₐᵀ C₀⁻¹ Zₐ + (λ² Q)⁻¹ = L Lᵀ,  G(λ) = Eᵀ C₀⁻¹ E - (L⁻¹ B)ᵀ (L⁻¹ B),
+                     B = Zₐᵀ C₀⁻¹ E, for any shape of Q             `part_products.PartPass.gram`
 
 The volume is that of a restricted likelihood (Patterson & Thompson 1971): the start is fitted, and
 how far a model lets it be felt is no evidence,
 
-    log|C| := log|R| + log|F + P₀⁻¹| - log|F| + Σ log(1 + λ² f).
+    log|C| := log|R| + log|F + P₀⁻¹| - log|F| + log|λ² Q| + log|A|.
 
 Numbers with the prior N(Λ⁻¹ η, Λ⁻¹), in units, are then integrated out (the evidence) or estimated
 (the posterior), G = Σ_s w_s G_s with blocks g₀₀, g = G₁₀ and M = G₁₁:
