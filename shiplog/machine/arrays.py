@@ -71,8 +71,8 @@ def put(values: Any, columns: Any, new: Any) -> Any:
     return made
 
 
+Array = Any  # of numpy or of JAX
 if TYPE_CHECKING:
     import jax.numpy as jnp
-    from jax import Array
 else:
-    jnp, Array = _Either(), np.ndarray  # or JAX's
+    jnp = _Either()

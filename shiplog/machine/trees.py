@@ -10,11 +10,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, fields, is_dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 Leaves = list[Any]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -50,11 +51,11 @@ def register(
         tell_jax()
 
 
-def tree(data: Iterable[str], fixed: Iterable[str] = ()) -> Callable[[type], type]:
+def tree(data: Iterable[str], fixed: Iterable[str] = ()) -> Callable[[type[T]], type[T]]:
     """Of a dataclass: fields that hold numbers or trees of them, and those that are fixed."""
     numbers, still = tuple(data), tuple(fixed)
 
-    def decorated(kind: type) -> type:
+    def decorated(kind: type[T]) -> type[T]:
         def flat(one: Any) -> tuple[list[Any], tuple[Any, ...]]:
             of_it = [getattr(one, name) for name in numbers]
             return of_it, tuple(getattr(one, name) for name in still)

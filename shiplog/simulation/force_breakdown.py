@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import polars as pl
 
@@ -24,8 +26,9 @@ def break_down(simulator: Simulator, seconds: pl.DataFrame, profile: Profile) ->
     else:
         blowing = np.zeros((seconds.height, 2))
     with double(), np.errstate(all="ignore"):
-        parts = simulator.model.forces(simulator.theta, state, actuator, blowing)
-    found = {name: np.asarray(force) for name, force in parts.items()}
+        model: Any = simulator.model  # of a run: it has forces by part
+        parts = model.forces(simulator.theta, state, actuator, blowing)
+    found: dict[str, Any] = {name: np.asarray(force) for name, force in parts.items()}
     found["total"] = sum(found.values())
     index = seconds.select("voyage", pl.col("elapsed").alias("time"))
     tables = []

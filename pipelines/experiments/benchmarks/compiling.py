@@ -22,7 +22,7 @@ from pipelines.experiments.benchmarks.rollouts import (
     processor,
     report,
 )
-from shiplog.diagnosis.linear import linearisation
+from shiplog.diagnosis.linear import jax_paths
 from shiplog.machine import jit_cache
 from shiplog.models.mmg.geometry import geometry_of
 from shiplog.models.mmg.model import MMG
@@ -48,7 +48,7 @@ def main() -> None:
     rng = np.random.default_rng(0)
     states = rng.normal(0.0, 0.3, (SEGMENTS, NODES, 6))
     driven = rng.normal(0.0, 0.5, (SEGMENTS, NODES, 4))  # rudder [rad], screw [1/s], wind [m/s]
-    lowered = jax.jit(linearisation._slopes._function).lower(model, theta, states, driven)
+    lowered = jax.jit(jax_paths._slopes._function).lower(model, theta, states, driven)
 
     print(f"{processor()}, {cores()} core(s), jax {jax.__version__}; {len(theta)} coefficients")
     ways = {"without emitters (ours)": WITHOUT, "with emitters": WITH}

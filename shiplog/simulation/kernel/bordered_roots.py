@@ -90,7 +90,7 @@ def _write(module: Module) -> None:
     counts = ("blocks", "places", "rows")
     arguments = [(n, POINTER) for n in names] + [(n, INT) for n in counts]
     with module.function("roots", arguments) as (f, values):
-        one = dict(zip((*names, *counts), values, strict=True))
+        one: dict[str, Value] = dict(zip((*names, *counts), values, strict=True))
         with f.loop(one["blocks"], outer=True) as block:
             _begin(f, one, block)
             with f.loop(one["rows"], outer=True) as b:

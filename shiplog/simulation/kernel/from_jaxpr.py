@@ -258,9 +258,10 @@ REDUCED = {
 def _chosen(g: Graph, test: int, no: int, *yes: int) -> int:
     if not yes:
         return no
-    if len(yes) > 1 or not g.is_truth(test):
+    first, *others = yes
+    if others or not g.is_truth(test):
         raise UnknownOperation("select of more than two")
-    return g.select(test, yes[0], no)
+    return g.select(test, first, no)
 
 
 def _converted(r: Reader, params: Any, x: Nodes) -> Nodes:

@@ -101,7 +101,8 @@ def plain(name: str, write: Callable[[Any], None], signatures: Sequence[tuple[st
     kernels of models, these are the portable ones."""
     level = machine_code.level() or machine_code.LEVELS[-1]
     key = (name, level.name)
-    if key not in _known:
+    known = _known.get(key)
+    if known is None:
         whose = f"{machine_code.whose(level)} {name}"
         found = machine_code.kept(whose)
         if found is None:
@@ -113,8 +114,8 @@ def plain(name: str, write: Callable[[Any], None], signatures: Sequence[tuple[st
             machine_code.keep(whose, *found)
         library = Library(found[1])
         functions = {n: library.function(n, given) for n, given in signatures}
-        _known[key] = Kernel(library, functions, 0, level.lanes)
-    return _known[key]
+        known = _known[key] = Kernel(library, functions, 0, level.lanes)
+    return known
 
 
 def _made(
