@@ -241,22 +241,30 @@ def test_evidence_is_that_of_the_best_of_a_fine_grid_of_noise_levels(made, kind,
     assert again.evidence == pytest.approx(max(values), abs=0.1)
 
 
-def test_the_top_of_a_parabola_by_hand():
-    """Of -(x - 0.3)² steps: between levels, from one side with three levels, and from two levels
-    with its bend; of levels far apart the best is all that is known."""
-    step = evidence.FINE_STEP
+def test_the_top_between_levels_by_hand():
+    """Of 4000 observations of a noise, greatest at 0.3 steps: between levels, from one side with
+    three levels, and from two levels with its bend; of levels far apart the best is all that is
+    known. A parabola would be 0.1 nats off."""
+    step, h, n = evidence.FINE_STEP, math.log(evidence.FINE_STEP), 4000.0
+
+    def value(power):
+        return -n * h * power - 0.5 * n * math.exp(-2.0 * h * (power - 0.3))
 
     def of(*powers, bend=0.0):
-        values = [-((x - 0.3) ** 2) for x in powers]
-        return evidence.top_of([step**x for x in powers], values, bend)
+        return evidence.top_of([step**x for x in powers], [value(x) for x in powers], bend)
 
-    for given in (of(1, 0, -1, 7), of(0, 1, 2), of(0, 1, bend=-2.0)):
-        place, gain, bend = given
-        assert gain == pytest.approx(0.09, abs=1e-9) and bend == pytest.approx(-2.0)
-        assert place == (1 if given == of(1, 0, -1, 7) else 0)
+    wanted, b = value(0.3) - value(0), value(1) - 2.0 * value(0) + value(-1)
+    assert 2.0 < wanted < 3.0 and b < -40.0
+    for given, place, off in ((of(1, 0, -1, 7), 1, 0.01), (of(0, 1, 2), 0, 0.1)):
+        assert given[0] == place
+        assert given[1] == pytest.approx(wanted, abs=off)
+        assert given[2] == pytest.approx(b, rel=0.02)
+    assert of(0, 1, bend=b)[1] == pytest.approx(wanted, abs=0.01)
+    parabola = (0.5 * (value(1) - value(-1))) ** 2 / (-2.0 * b)
+    assert abs(parabola - wanted) > 0.1
     assert of(4, 0, 8) == (1, 0.0, 0.0)
     _, gain, _ = of(5, 6, 7)  # the top is 4.7 steps away: one step is as far as it is trusted
-    assert gain == pytest.approx(4.7**2 - 3.7**2)
+    assert gain == pytest.approx(value(4) - value(5), rel=0.02)
 
 
 @pytest.mark.parametrize("power", (-17, -3, 0, 1, 6, 17))

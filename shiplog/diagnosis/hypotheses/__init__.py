@@ -35,10 +35,10 @@ their normal matrix is a Schur complement:
     log Z(x) - log Z = ½ yᵀ (M + σ⁻² I)⁻¹ y - ½ log|I + σ² M|                           (12)
 
 The factor λ of the process noise is that of the largest v(λ) = log Z(λ) + log p(λ). It is worked
-out at whole powers of a step, λ = 1.08ᵏ. The evidence is the top of the parabola through the best
-of them and its neighbours, v₋ and v₊:
+out at whole powers of a step, λ = 1.08ᵏ. The evidence is the top of the curve through the best of
+them and its neighbours, v₋ and v₊, as many observations of a noise have it: x steps away
 
-    max v ≈ v + s² / (-2b),   s = (v₊ - v₋) / 2,   b = v₊ - 2v + v₋
+    v(x) = v + s x + ½ b x² + c (x³ - x)/6,   s = (v₊ - v₋)/2,  b = v₊ - 2v + v₋,  c = -2b log 1.08
 
 b counts the observations (-b = 14 for two hours of a three-metre ship), so that the step alone
 would cost up to -b/8 nats. While a fit converges two levels give its slope, with the b of the
