@@ -232,9 +232,9 @@ def test_evidence_is_that_of_the_best_of_a_fine_grid_of_noise_levels(made, kind,
         evidence.level(trial, point, found.noise_factor * by, (), remaining).value for by in fine
     ]
     assert 0 < int(np.argmax(values)) < 48
-    assert found.evidence == pytest.approx(max(values), abs=0.01)
+    assert found.evidence == pytest.approx(max(values), abs=0.05)
     at_level = evidence.level(trial, point, found.noise_factor, (), remaining).value
-    assert at_level <= found.evidence < at_level - found.bend / 8.0 + 0.01
+    assert at_level <= found.evidence < at_level - found.bend / 8.0 + 0.05
     again, _ = evidence.scan(
         trial, point, (), (), found.noise_factor, remaining, bend=0.95 * found.bend
     )
@@ -242,26 +242,22 @@ def test_evidence_is_that_of_the_best_of_a_fine_grid_of_noise_levels(made, kind,
 
 
 def test_the_top_between_levels_by_hand():
-    """Of 4000 observations of a noise, greatest at 0.3 steps: between levels, from one side with
-    three levels, and from two levels with its bend; of levels far apart the best is all that is
-    known. A parabola would be 0.1 nats off."""
-    step, h, n = evidence.FINE_STEP, math.log(evidence.FINE_STEP), 4000.0
+    """Of a curve whose second difference falls by a step's logarithm: between levels, from one side
+    with three levels, and from two with its bend; of levels far apart the best is all that is
+    known."""
+    step, b, s = evidence.FINE_STEP, -20.0, 6.0
+    c = -math.log(step) * b
 
-    def value(power):
-        return -n * h * power - 0.5 * n * math.exp(-2.0 * h * (power - 0.3))
+    def value(x):
+        return s * x + 0.5 * b * x**2 + c * (x**3 - x) / 6.0
 
     def of(*powers, bend=0.0):
         return evidence.top_of([step**x for x in powers], [value(x) for x in powers], bend)
 
-    wanted, b = value(0.3) - value(0), value(1) - 2.0 * value(0) + value(-1)
-    assert 2.0 < wanted < 3.0 and b < -40.0
-    for given, place, off in ((of(1, 0, -1, 7), 1, 0.01), (of(0, 1, 2), 0, 0.1)):
-        assert given[0] == place
-        assert given[1] == pytest.approx(wanted, abs=off)
-        assert given[2] == pytest.approx(b, rel=0.02)
-    assert of(0, 1, bend=b)[1] == pytest.approx(wanted, abs=0.01)
-    parabola = (0.5 * (value(1) - value(-1))) ** 2 / (-2.0 * b)
-    assert abs(parabola - wanted) > 0.1
+    wanted = max(value(x) for x in np.linspace(0.0, 0.5, 5001))
+    for given, place in ((of(1, 0, -1, 7), 1), (of(0, 1, 2), 0), (of(0, 1, bend=b), 0)):
+        assert given == (place, pytest.approx(wanted, abs=1e-6), pytest.approx(b))
+    assert abs(s**2 / (-2.0 * b) - wanted) > 0.05  # as a parabola has it
     assert of(4, 0, 8) == (1, 0.0, 0.0)
     _, gain, _ = of(5, 6, 7)  # the top is 4.7 steps away: one step is as far as it is trusted
     assert gain == pytest.approx(value(4) - value(5), rel=0.02)
@@ -282,4 +278,4 @@ def test_the_noise_of_many_observations_is_reached_in_one_move(monkeypatch, powe
     found = evidence.top(evidence.levels(None, None))
     assert found.noise_factor == pytest.approx(step**power)
     assert len(asked) <= 6
-    assert found.value == pytest.approx(-n * power * math.log(step) - 0.5 * n, abs=0.01)
+    assert found.value == pytest.approx(-n * power * math.log(step) - 0.5 * n, abs=0.02)

@@ -38,7 +38,7 @@ The factor λ of the process noise is that of the largest v(λ) = log Z(λ) + lo
 out at whole powers of a step, λ = 1.08ᵏ. The evidence is the top of the curve through the best of
 them and its neighbours, v₋ and v₊, as many observations of a noise have it: x steps away
 
-    v(x) = v + s x + ½ b x² + c (x³ - x)/6,   s = (v₊ - v₋)/2,  b = v₊ - 2v + v₋,  c = -2b log 1.08
+    v(x) = v + s x + ½ b x² + c (x³ - x)/6,   s = (v₊ - v₋)/2,  b = v₊ - 2v + v₋,  c = -b log 1.08
 
 b counts the observations (-b = 14 for two hours of a three-metre ship), so that the step alone
 would cost up to -b/8 nats. While a fit converges two levels give its slope, with the b of the
