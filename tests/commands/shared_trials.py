@@ -45,6 +45,11 @@ def asked(trial):
         found += [one.G for one in trial.products.each_part(again, 1.1, trial.weight, remainder)]
         out = np.isin(trial.record.voyage[rows], [1])
         found.append(trial.products.leave_out(again, 1.1, trial.weight, remainder, out))
+    for remainder in (Remainder(), RAISES, pushed):
+        each = [trial.products.volume(trial.first, noise, trial.weight, remainder)
+                for noise in (0.5, 2.0, 7.0)]  # fmt: skip
+        assert len(set(each)) == 3
+        found.append(np.array(each))
     base, over = evidence.scan(trial, again, trial.reference.model.causes[:3])
     found += [np.array([base.evidence, base.noise_factor, *(one.evidence for one in over)])]
     left, _ = trial.less_misfit(again.linear, np.zeros(len(trial.reference.columns.unit)))

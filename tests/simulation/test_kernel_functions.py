@@ -193,6 +193,27 @@ def test_values_and_derivatives_are_jaxs(name, level):
         assert found[:, 1 + i] == pytest.approx(np.asarray(slopes[i]), rel=1e-10, abs=1e-12)
 
 
+CORNERS = {
+    "abs": jnp.abs, "of a square": lambda x: jnp.abs(x) * x, "cube": lambda x: jnp.abs(x) ** 3,
+    "max": lambda x: jnp.maximum(x, 0.0), "min": lambda x: jnp.minimum(0.0, x),
+    "clip": lambda x: jnp.clip(x, 0.0, 1.0), "clamp": lambda x: jax.lax.clamp(-1.0, x, 0.0),
+    "sign": lambda x: jnp.sign(x) * (1.0 + x), "relu": jax.nn.relu,
+    "root": lambda x: jnp.sqrt(jnp.maximum(x * x, 1e-12)),
+    "where": lambda x: jnp.where(x > 0.0, 2.0 * x, x),
+    "array": lambda x: jnp.stack((x, 0.0 * x)).max(), "power": lambda x: (x * x) ** 1.5,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CORNERS)
+def test_a_corner_has_jaxs_derivative(name):
+    """A ship at rest is on many of them."""
+    x = np.array([0.0, -0.0, 1.0, -1.0])
+    found = run(CORNERS[name], machine_code.level(), x, derivatives=True)
+    with double():
+        assert np.array_equal(found[:, 0], jax.vmap(CORNERS[name])(x))
+        assert np.array_equal(found[:, 1], jax.vmap(jax.grad(CORNERS[name]))(x))
+
+
 def test_derivatives_are_differences():
     """Without JAX in it."""
     function, h = CURVES["circle"], 1e-6

@@ -143,6 +143,19 @@ def test_derivatives_are_jaxs(sailed):
     assert (np.abs(found.gram - normal.gram) <= 1e-10 * np.maximum(size, 1e-300)).all()
 
 
+def test_a_ship_at_rest_has_jaxs_derivatives():
+    """Nothing moves, nothing is commanded, there is no wind: each |x| is at its corner."""
+    model, theta, actuators = MODELS["esso-vectwin"]()
+    count, size = 2, 4
+    rest = WindowSeries(
+        np.zeros((count, size, 6)), np.zeros((count, size, actuators)), np.zeros((count, size, 2)),
+        np.ones((count, size - 1)), np.ones(count),
+    )  # fmt: skip
+    found = sensitivities.linearised(model, theta, rest)
+    for one, wanted in zip(found, jax_rollouts.linearised(model, theta, rest), strict=True):
+        assert one == pytest.approx(wanted, rel=1e-10, abs=1e-14)
+
+
 @pytest.mark.parametrize("name", ["kvlcc2", "two rudders, all causes", "a user's cause"])
 def test_derivatives_are_differences(name):
     """Of rollouts, without JAX: central, of each of some coefficients."""

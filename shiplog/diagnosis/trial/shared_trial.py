@@ -143,7 +143,8 @@ class SharedProducts(Products):
     ) -> float:
         shared, known = self._known(first, weight)
         each = shared.ask("volumes", known, noise, remainder)
-        volumes, logdets = (itertools.chain.from_iterable(one[i] for one in each) for i in (0, 1))
+        logdets = itertools.chain.from_iterable(logdets for _, logdets in each)
+        volumes = itertools.chain.from_iterable(volumes for volumes, _ in each)
         return sum(volumes, sum(logdets))
 
     def _without(

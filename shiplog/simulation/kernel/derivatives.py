@@ -4,7 +4,8 @@
     2008, Evaluating Derivatives, Sec. 3.2)
 
 Value and derivatives are of one graph and share what they have in common. Where a function has a
-corner the derivative is JAX's: half of each side at max and min, 0 of |x| at 0.
+corner the derivative is that of JAX 0.10: half to each of two equal ones at max and min, 1 of |x|
+at 0, 0 at the limits of `lax.clamp`.
 """
 
 from __future__ import annotations
@@ -94,9 +95,7 @@ def _by(slope: Callable[[Graph, int, int], int]) -> Callable[..., Share]:
 
 
 def _abs(g: Graph, node: int, x: int) -> int:
-    zero = g.const(0.0)
-    below = g.select(g.apply("lt", x, zero), g.const(-1.0), zero)
-    return g.select(g.apply("gt", x, zero), g.const(1.0), below)
+    return g.select(g.apply("ge", x, g.const(0.0)), g.const(1.0), g.const(-1.0))
 
 
 def _select(g: Graph, node: int, bar: int, test: int, yes: int, no: int) -> Share:

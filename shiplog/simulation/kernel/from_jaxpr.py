@@ -184,7 +184,8 @@ def _cube_root(g: Graph, x: int) -> int:
 
 
 def _clamp(g: Graph, low: int, x: int, high: int) -> int:
-    return g.apply("min", g.apply("max", x, low), high)
+    within = g.select(g.apply("ge", x, high), high, x)
+    return g.select(g.apply("le", x, low), low, within)
 
 
 def _logical(kind: str) -> Callable[..., int]:
