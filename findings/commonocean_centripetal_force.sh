@@ -20,7 +20,7 @@ from vesselmodels.vessel_dynamics_3F import vessel_dynamics_3f
 
 ship = parameters_vessel_1()
 ship.x_g = 0.0
-for name in "X_udot Y_vdot Y_rdot N_rdot X_u Y_v Y_r N_v N_r".split():  # neither water nor damping
+for name in ("X_udot", "Y_vdot", "Y_rdot", "N_rdot", "X_u", "Y_v", "Y_r", "N_v", "N_r"):  # no water
     setattr(ship, name, 0.0)
 
 
@@ -33,8 +33,8 @@ start = np.array([0.0, 0.0, 0.0, speed, 0.0, turn])  # north, east, heading, sur
 sway = rates(0.0, start)[4]
 north, east = solve_ivp(rates, (0.0, 300.0), start, rtol=1e-9, atol=1e-9).y[:2, -1]
 print(
-    f"{speed:g} m/s and {turn:g} rad/s: sway acceleration {sway:.4f} m/s2, not {-speed * turn:.2f}; "
-    f"after 300 s at {north:.0f} and {east:.0f} m, not at {speed * 300:.0f} and 0 m"
+    f"{speed:g} m/s and {turn:g} rad/s: sway acceleration {sway:.4f} m/s2, not {-speed * turn:.2f}"
+    f"; after 300 s at {north:.0f} and {east:.0f} m, not at {speed * 300:.0f} and 0 m"
 )
 assert abs(sway + turn**2) < 1e-9, f"this has changed: {sway}"
 assert abs(north - 10.0) < 1.0 and abs(east - 750.0) < 1.0, f"this has changed: {north}, {east}"

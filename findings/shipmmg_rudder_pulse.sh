@@ -30,8 +30,8 @@ def run(**options: float) -> tuple[float, float]:
 plain, followed = run(), run(max_step=0.1)
 print(
     f"20 degrees from 500 to 520 s: rudder of the result {plain[0]:.1f}, change of heading "
-    f"{abs(plain[1]):.1f} degrees; with max_step=0.1: {followed[0]:.1f} and {followed[1]:.1f}; K times the "
-    f"angle times 20 s: {ship.K * 20.0 * 20.0:.1f}"
+    f"{abs(plain[1]):.1f} degrees; with max_step=0.1: {followed[0]:.1f} and {followed[1]:.1f}; K "
+    f"times the angle times 20 s: {ship.K * 20.0 * 20.0:.1f}"
 )
 assert abs(followed[0] - 20.0) < 0.5 and abs(followed[1] - 60.0) < 1.0, followed
 assert plain[0] < 1e-6 and abs(plain[1]) < 1e-6, f"this has changed: {plain}"

@@ -46,8 +46,10 @@ moment = (n_h + n_r) / (X_G * MASS * u * r)
 part = y_r / (-(1.0 + A_H) * normal * np.cos(rudder))
 print(
     f"steady turn, sum of the forces over what the turn needs: ahead {ahead:.2f}, sideways "
-    f"{sideways:.2f}, moment {moment:.2f}; rudder's sway force over -(1 + a_H) F_N cos(rudder): {part:.2f}"
+    f"{sideways:.2f}, moment {moment:.2f}; rudder's sway force over -(1 + a_H) F_N "
+    f"cos(rudder): {part:.2f}"
 )
 assert abs(ahead - 1.0) < 1e-3 and abs(moment - 1.0) < 1e-3, (ahead, moment)
-assert round(sideways, 2) == 1.24 and round(part, 2) == 0.47, f"this has changed: {sideways}, {part}"
+found = round(sideways, 2), round(part, 2)
+assert found == (1.24, 0.47), f"this has changed: {found}"
 P
