@@ -46,8 +46,8 @@ def flow(speed: float) -> float:
 stopped, turning, rest, slow = heading(0.0), heading(1e-3), flow(0.0), flow(1e-6)
 print(
     f"320 m ship at 7 m/s, 20 degrees of rudder, after 300 s: heading {stopped:.1f} at 0 "
-    f"revolutions, {turning:.1f} at 0.001; at rest with 1.6: flow past the rudder {rest:.1f} m/s, at "
-    f"1e-6 m/s: {slow:.1f} m/s"
+    f"revolutions, {turning:.1f} at 0.001; at rest with 1.6: flow past the rudder {rest:.1f} m/s, "
+    f"at 1e-6 m/s: {slow:.1f} m/s"
 )
 assert turning > 50.0 and 5.0 < slow < 7.0, (turning, slow)
 assert abs(stopped) < 1e-6 and rest > 7000.0, f"this has changed: {stopped}, {rest}"

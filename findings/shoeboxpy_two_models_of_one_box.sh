@@ -5,8 +5,8 @@
 # surge velocity belongs, so that the box itself needs no centripetal force, only its added mass does. A
 # guess would be one motion from both, as long as the box neither heaves, rolls nor pitches.
 #
-# Seen: "accelerations in surge, sway and yaw: three 0.0218 -0.0917 0.0000, six 0.0036 -0.0083 -0.0024; by
-# Fossen's equations 0.0218 -0.0917 -0.0024".
+# Seen: "accelerations in surge, sway and yaw: three 0.0218 -0.0917 0.0000, six 0.0036 -0.0083 -0.0020; by
+# Fossen's equations 0.0218 -0.0917 -0.0020".
 set -euo pipefail
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
