@@ -204,4 +204,7 @@ def test_shipmmg_missing_is_reported(monkeypatch):
 def test_experiments_are_not_installed():
     project = tomllib.loads((FOLDER.parents[2] / "pyproject.toml").read_text(encoding="utf-8"))
     assert project["tool"]["setuptools"]["packages"]["find"] == {"include": ["shiplog*"]}
-    assert project["project"]["optional-dependencies"]["experiments"] == ["shipmmg"]
+    assert project["project"]["optional-dependencies"]["experiments"] == [
+        "numba>=0.62",
+        "shipmmg",
+    ]

@@ -93,7 +93,7 @@ MODELS = {
 
 
 # What JAX needs to compile them all is CI's.
-QUICK = ("blueboat", "a user's cause")
+QUICK, ALL_CAUSES = ("blueboat", "a user's cause"), "two rudders, all causes"
 
 
 @pytest.fixture(
@@ -130,8 +130,13 @@ def test_accelerations_and_rollouts_are_jaxs(sailed):
     )
 
 
-def test_derivatives_are_jaxs(sailed):
-    model, theta, data = sailed
+@pytest.mark.parametrize(
+    "name",
+    [*QUICK, *(pytest.param(n, marks=pytest.mark.long) for n in (ALL_CAUSES, "hybrid"))],
+)
+def test_derivatives_are_jaxs(name):
+    model, theta, actuators = MODELS[name]()
+    data = sailing(actuators)
     states, slopes = sensitivities.linearised(model, theta, data)
     wanted, by_theta = jax_rollouts.linearised(model, theta, data)
     close(states, wanted, 1e-11)
@@ -179,11 +184,9 @@ def segments(actuators: int, nodes: int = 4, bins: int = 3, per: int = 4):
     return data.measured[:, 0], np.einsum("kj,sjc->skc", hats, acceleration), driven, hats
 
 
-@pytest.mark.parametrize(
-    "name", ["blueboat", pytest.param("two rudders, all causes", marks=pytest.mark.long)]
-)
+@pytest.mark.parametrize("name", ["blueboat", pytest.param(ALL_CAUSES, marks=pytest.mark.long)])
 def test_columns_of_segments_are_jaxs(name):
-    """By start, nodes and θ, in double precision, also by what numbers move of the inputs."""
+    """By start, nodes and θ along random directions, also by what numbers move of the inputs."""
     model, theta, actuators = MODELS[name]()
     start, acceleration, driven, hats = segments(actuators)
     pairs = np.array([[0, 1], [0, 4], [2, 0], [actuators + 1, 2]])
@@ -193,25 +196,32 @@ def test_columns_of_segments_are_jaxs(name):
         model, theta, start, acceleration, driven, hats, step, bins, (pairs, series, count)
     )
 
-    def means(begin, pushed, numbers, s):
-        moved = jnp.asarray(driven[s])
+    def means(begin, pushed, numbers, given):
+        moved, added, along = given
         for n, (d, q) in enumerate(pairs):
-            change = numbers[len(theta) - count + q] - theta[len(theta) - count + q]
-            moved = moved.at[:, d].add(change * series[s, n])
+            place = len(theta) - count + q
+            moved = moved.at[:, d].add((numbers[place] - theta[place]) * along[n])
         at = jax_paths.states_along(
-            model, numbers, begin[None], (acceleration[s] + hats @ pushed)[None], moved[None], step
+            model, numbers, begin[None], (added + hats @ pushed)[None], moved[None], step
         )[0]
         return (0.5 * (at[1:] + at[:-1])).reshape(bins, -1, 6).mean(1)
 
+    @jax.jit
+    def along(at, direction, given):
+        return jax.jvp(lambda *one: means(*one, given), at, direction)
+
+    rng = np.random.default_rng(5)
     with double():
         for s in (0, 7, 10):
-            given = jnp.asarray(start[s]), jnp.zeros((hats.shape[1], 3)), jnp.asarray(theta)
-            value = means(*given, s)
-            by = jax.jit(jax.jacrev(means, (0, 1, 2)), static_argnums=3)(*given, s)
-            nodes = np.moveaxis(np.asarray(by[1]), 3, 2).reshape(bins, 6, -1)
+            at = start[s], np.zeros((hats.shape[1], 3)), theta
+            direction = tuple(rng.normal(size=values.shape) for values in at)
+            value, slope = along(at, direction, (driven[s], acceleration[s], series[s]))
+            by_start, by_nodes, by_theta = direction
+            columns = np.concatenate((z[s], j[s]), -1)
+            whole = np.concatenate((by_start, by_nodes.T.ravel(), by_theta))
             close(y[s], value, 1e-12)
-            close(z[s], np.concatenate((by[0], nodes), -1), 1e-10)
-            close(j[s], by[2], 1e-10)
+            size = np.abs(columns) @ np.abs(whole)
+            assert (np.abs(columns @ whole - np.asarray(slope)) <= 1e-12 * size).all()
     alone, without, nothing = paths.columns(
         model, theta, start, acceleration, driven, hats, step, bins
     )
