@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from shiplog.diagnosis.hypotheses import evidence
+from shiplog.diagnosis.linear import segment_nodes
+from shiplog.diagnosis.noise import on_off
 from shiplog.diagnosis.noise.on_off import Course
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, RAISED, Remainder
 from shiplog.diagnosis.trial import setup, trial_voyages
@@ -52,6 +54,17 @@ def asked(trial):
         found.append(np.array(each))
     base, over = evidence.scan(trial, again, trial.reference.model.causes[:3])
     found += [np.array([base.evidence, base.noise_factor, *(one.evidence for one in over)])]
+    numbers = 0.1 * np.sqrt(np.arange(len(trial.reference.columns.unit)) % 3 + 0.0)
+    numbers = numbers * trial.reference.columns.unit
+    left = trial.noise_left(again, numbers)
+    nominal = trial.reference.process_noise
+    kept = trial.rows[trial.weight > 0.0]
+    runs = on_off.runs(course.on, segment_nodes.rows_of_nodes(kept, trial.grid))
+    force = np.array([0.0, 0.02, 0.001])
+    noises = [nominal.times(1.3), RAISES.apply_to(nominal), replace(nominal, intermittent=force)]
+    noises += [replace(one, intermittent=force, runs=runs) for one in noises]
+    found.append(np.array([left.likelihood(one) for one in noises]))
+    found += trial.force_across(again, numbers, 1.1, pushed)
     left, _ = trial.less_misfit(again.linear, np.zeros(len(trial.reference.columns.unit)))
     found += [left.e, left.z, left.j, left.cut.rows, trial.covering(again).e]
     half = replace(trial, weight=trial.weight * np.arange(len(rows)) / len(rows))

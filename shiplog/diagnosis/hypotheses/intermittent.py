@@ -22,10 +22,9 @@ from shiplog.diagnosis.hypotheses import fits, unrecorded_thruster
 from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
 from shiplog.diagnosis.linear import segment_nodes
 from shiplog.diagnosis.linear.segments import SegmentGrid
-from shiplog.diagnosis.noise import likelihood, on_off, raised_noise
-from shiplog.diagnosis.noise.likelihood import ProcessNoise
+from shiplog.diagnosis.noise import on_off, raised_noise
 from shiplog.diagnosis.noise.on_off import ON, STRONGEST
-from shiplog.diagnosis.noise.raised_noise import Residual
+from shiplog.diagnosis.noise.raised_noise import Residual, Residuals
 from shiplog.diagnosis.noise.remainder import Remainder
 from shiplog.diagnosis.nominal.nominal_campaign import Campaign
 from shiplog.diagnosis.trial.fitted import Fit
@@ -35,7 +34,6 @@ from shiplog.diagnosis.trial.trial import Trial
 OFF = 0.2  # share of the strongest, below which it is off
 KNOWN = 2.0  # standard deviations of the estimate: a weaker force shows no pattern
 COMES_AND_GOES = 0.5  # of the time: what is on for longer is no device that comes and goes
-NO_NOISE = 1e-9  # of the process noise, that leaves the intermittent force by itself
 VARIES = 1.0  # time between over time on, from which a force merely varies: a Gaussian one has 1.13
 
 
@@ -109,7 +107,7 @@ def side_force(trial: Trial, fit: Fit, at_one_place: Remainder | None = None) ->
     found = unrecorded_thruster.estimate_side_force(left, trial.reference, at_one_place)
     if found.gain <= 0.0:
         return found
-    force, deviation = force_at_nodes(trial, fit, found, trial.process_noise(found.remainder))
+    force, deviation = force_at_nodes(trial, fit, found, found.remainder)
     found = replace(found, device=device_probability(force, deviation))
     if found.device == 0.0:
         return found
@@ -124,11 +122,9 @@ def side_force(trial: Trial, fit: Fit, at_one_place: Remainder | None = None) ->
     return max((found, *devices), key=lambda one: one.value)
 
 
-def noise_left(trial: Trial, fit: Fit) -> Residual:
+def noise_left(trial: Trial, fit: Fit) -> Residual | Residuals:
     """The residual r - W w - J d of a hypothesis, to be explained by noise."""
-    left, d = fits.residual(trial, fit.point.linear, fit)
-    ref = trial.reference
-    return raised_noise.residual(left, d, ref.process_noise, trial.weight, ref.counts)
+    return trial.noise_left(fit.point, fits.numbers_from_point(trial, fit))
 
 
 def add_pattern(trial: Trial, fit: Fit, side_force: SideForce) -> SideForce:
@@ -140,29 +136,17 @@ def add_pattern(trial: Trial, fit: Fit, side_force: SideForce) -> SideForce:
 
 
 def force_at_nodes(
-    trial: Trial, fit: Fit, side_force: SideForce, process_noise: ProcessNoise | None = None
+    trial: Trial, fit: Fit, side_force: SideForce, remainder: Remainder | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Mean and standard deviation (3) of the unrecorded thruster's force at the nodes [S, J], N.
 
-    It is that of a hypothesis whose remainder has it, or in the given process noise that has it."""
-    if process_noise is None:
-        process_noise = trial.process_noise(fit.remainder).times(fit.estimate.noise_factor)
-    left = fits.residual(trial, fit.point.linear, fit)
-    z, covariance = likelihood.starts_and_accelerations(*left, process_noise)
-    a, V, J = z[:, 6:, None], covariance[:, 6:, 6:], trial.grid.nodes
-    Q = process_noise.kernel(J)
-    force_alone = replace(process_noise, acceleration=NO_NOISE * process_noise.acceleration)
-    Q_f = force_alone.kernel(J)
-    K = Q_f @ np.linalg.inv(Q)
-    mean = (K @ a).reshape(len(z), 3, J)
-    sway = slice(J, 2 * J)
-    not_in_a = (Q_f - K @ Q_f)[..., sway, sway]
-    K_sway = K[..., sway, :]
-    variance = np.diagonal(
-        K_sway @ V @ np.swapaxes(K_sway, -1, -2) + not_in_a, axis1=1, axis2=2
-    )  # fmt: skip
+    It is that of a hypothesis whose remainder has it, or of the given remainder that has it, with
+    λ = 1."""
+    noise = 1.0 if remainder is not None else fit.estimate.noise_factor
+    d = fits.numbers_from_point(trial, fit)
+    mean, variance = trial.force_across(fit.point, d, noise, remainder or fit.remainder)
     newton = side_force.unit[1]  # sway acceleration of 1 N
-    return mean[:, 1] / newton, np.sqrt(np.maximum(variance, 0.0)) / newton
+    return mean / newton, np.sqrt(np.maximum(variance, 0.0)) / newton
 
 
 def active_intervals(trial: Trial, fit: Fit, side_force: SideForce) -> list[dict]:

@@ -26,7 +26,7 @@ from scipy.optimize import minimize
 
 from shiplog.diagnosis.noise import on_off
 from shiplog.diagnosis.noise.on_off import Course
-from shiplog.diagnosis.noise.raised_noise import Residual, raise_channels
+from shiplog.diagnosis.noise.raised_noise import Residual, Residuals, raise_channels
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, Remainder
 from shiplog.diagnosis.nominal.nominal_reference import Reference
 from shiplog.models.mmg import MMG, body
@@ -113,7 +113,7 @@ def extrapolated(last: Step, this: Step) -> SideForce:
 
 
 def estimate_side_force(
-    left: Residual, ref: Reference, at_one_place: Remainder | None = None
+    left: Residual | Residuals, ref: Reference, at_one_place: Remainder | None = None
 ) -> SideForce:
     """The most probable intermittent side force at one place along the ship, from the residual.
     It accelerates sway and yaw together, as no other process noise does. `at_one_place` as
@@ -126,7 +126,11 @@ def estimate_side_force(
 
 
 def estimate_on_off_force(
-    left: Residual, ref: Reference, stationary: SideForce, course: Course, rows: np.ndarray
+    left: Residual | Residuals,
+    ref: Reference,
+    stationary: SideForce,
+    course: Course,
+    rows: np.ndarray,
 ) -> SideForce:
     """The most probable force of a device with this course, from one that may act at any time.
 
@@ -147,7 +151,7 @@ class _Likelihood:
     """Of a side force, by its lever in ship lengths, size [N] and correlation time over the usual
     one."""
 
-    def __init__(self, left: Residual, ref: Reference) -> None:
+    def __init__(self, left: Residual | Residuals, ref: Reference) -> None:
         self._left, self.length = left, ref.setting.scale["length"]
         self.across, self._turning = accelerations(  # of 1 N, of 1 N m
             ref.model.stand_in, ref.coefficients, np.eye(3)[1:]

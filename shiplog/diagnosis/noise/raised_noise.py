@@ -13,6 +13,7 @@ noise that lasts longer than that of the nominal voyages: swell and squalls do.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -42,8 +43,56 @@ class Residual:
 
     def likelihood(self, process_noise: ProcessNoise) -> float:
         """-½ κ (Σ_s w_s r_sᵀ C_s⁻¹ r_s + Σ_s log|C_s|): log likelihood, nats, up to a constant."""
+        return -0.5 * self.counts * self.misfit(process_noise)
+
+    def misfit(self, process_noise: ProcessNoise) -> float:
+        """Σ_s w_s r_sᵀ C_s⁻¹ r_s + Σ_s log|C_s|."""
+        if not len(self.weight):
+            return 0.0
         each, volume = self.startless.square(process_noise)
-        return -0.5 * self.counts * (float(self.weight @ each) + volume)
+        return float(self.weight @ each) + volume
+
+
+Misfits = Callable[[ProcessNoise, Sequence[np.ndarray] | None], Sequence[float]]
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """A residual in blocks of voyages, added block by block: the same to the last bit wherever they
+    are worked out.
+
+    nominal, counts  as of a `Residual`
+    sizes            segments of each block
+    misfits          process noise without its runs, and the runs of each block → of each block its
+                     `Residual.misfit`
+    """
+
+    nominal: ProcessNoise
+    counts: float
+    sizes: tuple[int, ...]
+    misfits: Misfits
+
+    def likelihood(self, process_noise: ProcessNoise) -> float:
+        """As of a `Residual`."""
+        runs = process_noise.runs
+        each = None if runs is None else np.split(runs, np.cumsum(self.sizes)[:-1])
+        return -0.5 * self.counts * sum(self.misfits(replace(process_noise, runs=None), each))
+
+
+def in_blocks(blocks: Sequence[Residual]) -> Residual | Residuals:
+    """The residual of all blocks, which are here."""
+    if len(blocks) == 1:
+        return blocks[0]
+
+    def misfits(process_noise: ProcessNoise, runs: Sequence[np.ndarray] | None) -> Sequence[float]:
+        each = [None] * len(blocks) if runs is None else runs
+        return [
+            block.misfit(replace(process_noise, runs=own))
+            for block, own in zip(blocks, each, strict=True)
+        ]
+
+    sizes = tuple(len(block.weight) for block in blocks)
+    return Residuals(blocks[0].nominal, blocks[0].counts, sizes, misfits)
 
 
 def residual(
@@ -61,7 +110,7 @@ def residual(
 
 
 def raise_channels(
-    left: Residual, at_one_place: Remainder | None = None
+    left: Residual | Residuals, at_one_place: Remainder | None = None
 ) -> tuple[float, Remainder]:
     """max over (log c_u, log c_v, log c_r, log c_τ) of log p(r | c), nats, and the factors c of
     surge, sway, yaw rate and correlation time (Nelder & Mead 1965, from the best common factor).

@@ -24,6 +24,7 @@ from shiplog.diagnosis.linear import linearisation
 from shiplog.diagnosis.linear.linear_segments import Linear, Path, Wide
 from shiplog.diagnosis.noise.campaign_parts import squares
 from shiplog.diagnosis.noise.likelihood import ProcessNoise
+from shiplog.diagnosis.noise.raised_noise import Residual
 from shiplog.diagnosis.noise.remainder import Remainder
 from shiplog.diagnosis.trial.cache import Cache
 from shiplog.diagnosis.trial.fitted import Point
@@ -111,6 +112,7 @@ class Block:
     begin: int
     known: dict[str, Any] = field(default_factory=dict)
     points: dict[str, Point] = field(default_factory=dict)
+    residual: tuple[tuple[str, ...], Residual] | None = None
 
     def answer(self, method: str, kept: Sequence[Kept], rest: tuple[Any, ...]) -> Any:
         """Of one of the methods below; Missing, or Diverged."""
@@ -197,6 +199,27 @@ class Block:
         """G_k of each part (3), which are large."""
         own, w = self._remainder(remainder), self.known[weight]
         return list(self.trial.products.each_part(self._point(at), noise, w, own))
+
+    def misfit(
+        self, at: str, weight: str, left: str, runs: str, process_noise: ProcessNoise
+    ) -> float:
+        """Of what the numbers `left` leave, `raised_noise.Residual.misfit`."""
+        key = (at, weight, left)
+        if self.residual is None or self.residual[0] != key:
+            own = replace(self.trial, weight=self.known[weight])
+            found = own.noise_left(self._point(at), self.known[left])
+            assert isinstance(found, Residual)  # a block is one
+            self.residual = key, found
+        own_runs = self.known[runs]
+        return self.residual[1].misfit(
+            replace(process_noise, runs=own_runs if len(own_runs) else None)
+        )
+
+    def force_across(
+        self, at: str, d: np.ndarray, noise: float, remainder: Remainder
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """As of a trial, of its own segments."""
+        return self.trial.force_across(self._point(at), d, noise, self._remainder(remainder))
 
     def squares(
         self, at: str, d: np.ndarray, nominal: ProcessNoise, process_noise: ProcessNoise

@@ -18,6 +18,7 @@ from shiplog.diagnosis.linear import linearisation
 from shiplog.diagnosis.linear.linear_segments import Linear, Path
 from shiplog.diagnosis.noise.likelihood import ProcessNoise
 from shiplog.diagnosis.noise.part_products import Gram
+from shiplog.diagnosis.noise.raised_noise import Residuals
 from shiplog.diagnosis.noise.remainder import Remainder
 from shiplog.diagnosis.trial.blocks import Block, Call, Holders, Kept, Place, Sum, cut_into_blocks
 from shiplog.diagnosis.trial.cache import Numbers, Total
@@ -233,6 +234,38 @@ class SharedTrial(Trial):
         asked = [(one,) for one in places_of(point)]
         nominal = self.reference.process_noise
         return np.concatenate(self.shared.ask("squares", asked, d, nominal, process_noise))
+
+    def noise_left(self, point: Point, d: np.ndarray) -> Residuals:
+        shared, ref = self.shared, self.reference
+        assert shared is not None
+        weights, places = shared.weights(self.weight), places_of(point)
+        numbers = Kept(f"numbers {next(shared.count)}", d)
+        none = Kept("no runs", np.zeros(0))
+        last: list[tuple[object, list[Kept]]] = []  # runs that were sent, and under which keys
+
+        def misfits(
+            process_noise: ProcessNoise, runs: Sequence[np.ndarray] | None
+        ) -> Sequence[float]:
+            each = [none] * len(places)
+            if runs is not None:
+                if not last or last[0][0] is not runs[0].base:
+                    key = f"runs {next(shared.count)}"
+                    last[:] = [(runs[0].base, [Kept(key, one) for one in runs])]
+                each = last[0][1]
+            known = list(zip(places, weights, [numbers] * len(places), each, strict=True))
+            return shared.ask("misfit", known, process_noise)
+
+        sizes = tuple(int((one.value > 0.0).sum()) for one in weights)
+        return Residuals(ref.process_noise, ref.counts, sizes, misfits)
+
+    def force_across(
+        self, point: Point, d: np.ndarray, noise: float, remainder: Remainder
+    ) -> tuple[np.ndarray, np.ndarray]:
+        assert self.shared is not None
+        asked = [(one,) for one in places_of(point)]
+        found = self.shared.ask("force_across", asked, d, noise, remainder)
+        mean, variance = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        return mean, variance
 
     def less_misfit(self, linear: Linear, d: np.ndarray) -> tuple[Linear, np.ndarray]:
         whole = linear.gathered() if isinstance(linear, Remote) else linear

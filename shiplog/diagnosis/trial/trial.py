@@ -18,10 +18,11 @@ from shiplog.diagnosis.linear import linearisation, segment_nodes, segments
 from shiplog.diagnosis.linear.linear_segments import Linear, Path, acting
 from shiplog.diagnosis.linear.measurement_correction import as_hypothesised, read
 from shiplog.diagnosis.linear.segments import SegmentGrid
-from shiplog.diagnosis.noise import discrepancy, residual_acceleration
+from shiplog.diagnosis.noise import discrepancy, part_of_noise, raised_noise, residual_acceleration
 from shiplog.diagnosis.noise.campaign_parts import PART, parts_of, squares
 from shiplog.diagnosis.noise.discrepancy import Discrepancy
 from shiplog.diagnosis.noise.likelihood import ProcessNoise
+from shiplog.diagnosis.noise.raised_noise import Residual, Residuals
 from shiplog.diagnosis.noise.remainder import LEAST_SPREAD, Remainder
 from shiplog.diagnosis.nominal.nominal_campaign import Campaign
 from shiplog.diagnosis.nominal.nominal_reference import Reference
@@ -181,6 +182,27 @@ class Trial:
         left, d = self.less_misfit(point.linear, d)
         left = replace(left, e=left.e - left.j @ d)
         return squares(left, self.reference.process_noise, process_noise)
+
+    def noise_left(self, point: Point, d: np.ndarray) -> Residual | Residuals:
+        """r = e - W w - J d, of numbers and weights d, to be explained by noise."""
+        left, d = self.less_misfit(point.linear, d)
+        ref, of = self.reference, self.record.voyage[self.rows]
+        blocks = []
+        for voyages in self.products.blocks:
+            own = np.isin(of, voyages)
+            one = left if own.all() else left.pick(own)
+            blocks.append(
+                raised_noise.residual(one, d, ref.process_noise, self.weight[own], ref.counts)
+            )
+        return raised_noise.in_blocks(blocks)
+
+    def force_across(
+        self, point: Point, d: np.ndarray, noise: float, remainder: Remainder
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and variance [S, J] of an intermittent force in e - W w - J d, with the process
+        noise of a remainder times λ = `noise`: `part_of_noise.across_at_nodes`."""
+        left, d = self.less_misfit(point.linear, d)
+        return part_of_noise.across_at_nodes(left, d, self.process_noise(remainder).times(noise))
 
     def reading(self, numbers: Numbers) -> Read:
         """The segments as read with these numbers, and the effects of all of them on the inputs
