@@ -131,8 +131,7 @@ def test_accelerations_and_rollouts_are_jaxs(sailed):
 
 
 @pytest.mark.parametrize(
-    "name",
-    [*QUICK, *(pytest.param(n, marks=pytest.mark.long) for n in (ALL_CAUSES, "hybrid"))],
+    "name", [pytest.param(n, marks=[] if n in QUICK else pytest.mark.long) for n in MODELS]
 )
 def test_derivatives_are_jaxs(name):
     model, theta, actuators = MODELS[name]()
@@ -265,6 +264,25 @@ def test_memory_of_an_earlier_call_is_used_again_and_no_other():
     for bad in (plain, (wanted[0], wanted[1][:-1]), (wanted[0].astype("f4"), wanted[1])):
         with pytest.raises(ValueError, match="earlier call"):
             sensitivities.linearised(model, theta, data, out=bad)
+
+
+def test_arrays_that_do_not_fit_together_are_refused():
+    """What is read is never what stands behind an array."""
+    model, theta, actuators = MODELS["blueboat"]()
+    data = sailing(actuators)
+    for name in ("actuator", "wind", "dt", "weight"):
+        short = data._replace(**{name: getattr(data, name)[:-1]})
+        with pytest.raises(ValueError, match="shape"):
+            sensitivities.normal(model, theta, short)
+    with pytest.raises(ValueError, match="free"):
+        sensitivities.normal(model, theta, data, (0, len(theta)))
+    start, acceleration, driven, hats = segments(actuators)
+    for pairs in ([[0, 2]], [[actuators + 2, 0]], [[-1, 0]]):
+        moved = np.array(pairs), np.zeros((11, 1, len(hats))), 2
+        with pytest.raises(ValueError, match="pairs"):
+            paths.columns(model, theta, start, acceleration, driven, hats, 0.5, 3, moved)
+    with pytest.raises(ValueError, match="shape"):
+        paths.columns(model, theta, start[:-1], acceleration, driven, hats, 0.5, 3)
 
 
 def test_levels_agree(monkeypatch):

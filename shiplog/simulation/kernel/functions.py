@@ -10,7 +10,6 @@ from sample to sample.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from shiplog.simulation.kernel.graph import Graph
 from shiplog.simulation.kernel.writer import POINTER, Function, Module, Value
@@ -26,13 +25,6 @@ OPERATORS = {
 WHOLE, MANTISSA, BIAS = 1.5 * 2.0**52, 52, 1023
 WHOLE_BITS = 0x4338000000000000
 ROOT_HALF_BITS = 0x3FE6A09E00000000  # of √½, rounded down: fractions are from there to twice that
-
-
-@dataclass(frozen=True)
-class Written:
-    """How many constants are hoisted, by all functions of a module together."""
-
-    constants: int
 
 
 class Functions:
@@ -65,8 +57,8 @@ class Functions:
             node = self._graph.select(node, one, zero)
         return self._hoisted.setdefault(node, len(self._hoisted))
 
-    def prepare(self) -> Written:
-        """Last of all, when it is known what is hoisted."""
+    def prepare(self) -> int:
+        """Last of all, when it is known what is hoisted: how many constants by all functions."""
         g, scalar = self._graph, Module(1)
         arguments = [("fixed", POINTER), ("c", POINTER)]
         with scalar.function("prepare", arguments) as (f, (fixed, c)):
@@ -76,7 +68,7 @@ class Functions:
             for node, place in self._hoisted.items():
                 f.store(values.of(node), c, place)
         self._module.adopt(scalar)
-        return Written(len(self._hoisted))
+        return len(self._hoisted)
 
 
 class _Values:

@@ -8,7 +8,7 @@ import numpy as np
 
 from shiplog.simulation.kernel import kinds
 from shiplog.simulation.kernel.kinds import aligned, contiguous, pointer
-from shiplog.simulation.kernel.paths import begun_by
+from shiplog.simulation.kernel.paths import begun_by, moving
 from shiplog.simulation.kernel.segments import COUNTS, GIVEN, Segments
 from shiplog.simulation.kernel.windows import STATES, Sizes
 
@@ -44,13 +44,12 @@ def columns(
             by_theta.reshape(count, instants, -1),
         ), -1,
     )  # fmt: skip
-    pairs, series, causes = moved or (np.zeros((0, 2)), np.zeros((count, 0, instants)), 0)
+    pairs, series, causes = moving(moved, count, instants, sizes.driven, of_j)
     of_z = STATES + 3 * nodes
     z, j = np.empty((count, bins, STATES, of_z)), np.empty((count, bins, STATES, of_j))
     arrays = {
         "slopes": contiguous(whole), "states": contiguous(states), "hats": contiguous(hats),
-        "begun": begun_by(hats), "moved": contiguous(series),
-        "pairs": np.ascontiguousarray(pairs, dtype=np.int64), "z": z, "j": j,
+        "begun": begun_by(hats), "moved": series, "pairs": pairs, "z": z, "j": j,
         "work": aligned(4 * STATES * (of_z + of_j) * kernel.lanes),
     }  # fmt: skip
     counts = {

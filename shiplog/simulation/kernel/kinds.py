@@ -175,7 +175,7 @@ def written(
         zeros = frozenset(i for i, node in enumerate(nodes) if plain.value(node) == 0.0)
         sizes[name] = _sizes(driven, coefficients, zeros, by)
         at += len(nodes)
-    constants = functions.prepare().constants
+    constants = functions.prepare()
     purpose.write(module, sizes)
     return module.text, constants
 
@@ -242,5 +242,10 @@ def traced(
     return [int(node) for node in found.ravel()], x, [int(node) for node in theta]
 
 
-def contiguous(values: Sequence | np.ndarray) -> np.ndarray:
-    return np.ascontiguousarray(values, dtype=float)
+def contiguous(values: Sequence | np.ndarray, *shape: int) -> np.ndarray:
+    """Doubles one after the other. Raises ValueError for another shape: code reads what it is told
+    of, and would read what stands behind an array that is too small."""
+    found = np.ascontiguousarray(values, dtype=float)
+    if shape and found.shape != shape:
+        raise ValueError(f"an array has the shape {found.shape}, not {shape}")
+    return found

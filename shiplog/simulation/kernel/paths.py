@@ -53,15 +53,16 @@ def columns(
     if kernel is None:
         return None
     count, instants, nodes = len(start), len(hats), hats.shape[1]
-    pairs, series, causes = moved or (np.zeros((0, 2)), np.zeros((count, 0, instants)), 0)
+    pairs, series, causes = moving(moved, count, instants, driven.shape[2], len(theta))
     of_z, of_j = STATES + 3 * nodes, len(theta) if moved is not None else 0
     y, z = np.empty((count, bins, STATES)), np.empty((count, bins, STATES, of_z))
     j = np.empty((count, bins, STATES, of_j))
     arrays = {
-        "c": kernel.prepared(model, theta), "start": contiguous(start),
-        "acceleration": contiguous(acceleration), "driven": contiguous(driven),
-        "hats": contiguous(hats), "begun": begun_by(hats), "moved": contiguous(series),
-        "pairs": np.ascontiguousarray(pairs, dtype=np.int64), "y": y, "z": z, "j": j,
+        "c": kernel.prepared(model, theta), "start": contiguous(start, count, STATES),
+        "acceleration": contiguous(acceleration, count, instants, 3),
+        "driven": contiguous(driven, count, instants, driven.shape[2]),
+        "hats": contiguous(hats), "begun": begun_by(hats), "moved": series, "pairs": pairs,
+        "y": y, "z": z, "j": j,
         "work": aligned(4 * STATES * (of_z + of_j) * kernel.lanes),
     }  # fmt: skip
     counts = {
@@ -72,6 +73,24 @@ def columns(
         run = kernel.functions["paths_of" if moved is None else "columns_of"]
         run(*(pointer(arrays[n]) for n in POINTERS), *(counts[n] for n in COUNTS), step)
     return y, z, j if moved is not None else None
+
+
+def moving(
+    moved: tuple[np.ndarray, np.ndarray, int] | None,
+    count: int,
+    instants: int,
+    driving: int,
+    coefficients: int,
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """Pairs, series and Q as the loops take them; none of them for None. Raises ValueError for
+    pairs of what does not drive or is no number, and for series of other segments."""
+    if moved is None:
+        return np.zeros((0, 2), np.int64), np.zeros((count, 0, instants)), 0
+    pairs, causes = np.ascontiguousarray(moved[0], dtype=np.int64).reshape(-1, 2), moved[2]
+    known = (pairs >= 0) & (pairs < (driving, causes))
+    if not known.all() or not 0 <= causes <= coefficients:
+        raise ValueError(f"pairs go beyond {driving} inputs or {causes} numbers")
+    return pairs, contiguous(moved[1], count, len(pairs), instants), causes
 
 
 def begun_by(hats: np.ndarray) -> np.ndarray:

@@ -100,15 +100,15 @@ def normal(model: Any, theta: np.ndarray, data: WindowSeries, free: Sequence[int
     n, lanes = len(free), kernel.lanes
     padded, blocks = _padded(n, BLOCK), -(-count // lanes)
     columns = np.ascontiguousarray(free, dtype=np.int64)
+    if n and not (columns.min() >= 0 and columns.max() < len(theta)):
+        raise ValueError(f"free names coefficients that are not of {len(theta)}")
     loss, pull = np.empty(blocks * lanes), np.empty((blocks, padded, lanes))
     s, rows = aligned(STATES * padded * lanes), aligned(CHUNK * 3 * padded * lanes)
     cells = padded // BLOCK * (padded // BLOCK + 1) // 2
     gram = aligned(cells, BLOCK, BLOCK, lanes)
-    c, given = (
-        kernel.prepared(model, theta),
-        [*_given(data)[1:], *map(contiguous, (data.steps, data.weight))],
-    )
-    measured = contiguous(data.measured)
+    c, measured = kernel.prepared(model, theta), contiguous(data.measured)
+    steps, weight = contiguous(data.steps, count, instants), contiguous(data.weight, count)
+    given = [*_given(data)[1:], steps, weight]
     if count:
         kernel.functions["normal"](
             pointer(c), pointer(measured), *map(pointer, given), pointer(columns), pointer(loss),
@@ -140,8 +140,14 @@ def _driven(data: WindowSeries) -> int:
 
 
 def _given(data: WindowSeries) -> list[np.ndarray]:
-    """First states, actuators, wind and steps."""
-    return [contiguous(v) for v in (data.measured[:, 0], data.actuator, data.wind, data.dt)]
+    """First states, actuators, wind and steps. Raises ValueError where they do not fit together."""
+    count, instants, _ = data.measured.shape
+    return [
+        contiguous(data.measured[:, 0], count, STATES),
+        contiguous(data.actuator, count, instants, data.actuator.shape[-1]),
+        contiguous(data.wind, count, instants, 2),
+        contiguous(data.dt, count, instants - 1),
+    ]
 
 
 def _steps(model: Any) -> tuple[int, float]:

@@ -53,12 +53,6 @@ class Value:
     def __rmul__(self, other: float) -> Value:
         return self._with(other, "mul", "fmul", True)
 
-    def __floordiv__(self, other: Value | int) -> Value:
-        return self._with(other, "sdiv", "fdiv")
-
-    def __mod__(self, other: Value | int) -> Value:
-        return self._with(other, "srem", "frem")
-
     def __truediv__(self, other: Value | float) -> Value:
         return self._with(other, "sdiv", "fdiv")
 
@@ -221,11 +215,6 @@ class Function:
             text = f"insertelement {vector} {found.text}, double {value.text}, i64 {lane}"
             found = self.put(text, vector)
         return found
-
-    def lane(self, value: Value, lane: int) -> Value:
-        if self.module.lanes == 1:
-            return value
-        return self.put(f"extractelement {value.kind} {value.text}, i64 {lane}", DOUBLE)
 
     def transposed(self, rows: Sequence[Value]) -> list[Value]:
         """As many vectors as there are lanes, rows for columns: by halves, quarters …"""
