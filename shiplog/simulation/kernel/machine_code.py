@@ -68,7 +68,9 @@ def level(wanted: str | None = None) -> Level | None:
     try:
         has = _llvm().get_host_cpu_features()
     except (ImportError, OSError, RuntimeError) as error:
-        log.warning("JAX runs all models, and diagnose cannot run: LLVM cannot be loaded (%s).", error)
+        log.warning(
+            "JAX runs all models, and diagnose cannot run: LLVM cannot be loaded (%s).", error
+        )
         return None
     fitting = [one for one in LEVELS if all(has.get(feature) for feature in one.needs)]
     names = [one.name for one in LEVELS]
