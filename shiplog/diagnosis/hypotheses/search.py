@@ -1,13 +1,21 @@
 """The search: which hypotheses are weighed, starting from the best ones so far.
 
 The loop takes the best hypothesis, asks for its candidates (`additions`, `reductions`), weighs each
-(`weighing.weigh`), and puts what comes back into the table.
+(`weighing`), and puts what comes back into the table.
 
 Each set of causes is linearised again at its most probable numbers, and weighed under every kind of
-remainder. One cause is then added to the best hypotheses or dropped from them, until no promising
-set is left. A remainder may explain a part of what a cause explains wholly. As long as a cause
-promises about as much as the best hypothesis has, it is therefore added to nothing as well. The
-order in which sets are weighed matters for those alone that are far behind.
+remainder that could win. One cause is then added to the best hypotheses or dropped from them, until
+no promising set is left. A remainder may explain a part of what a cause explains wholly. As long as
+a cause promises about as much as the best hypothesis has, it is therefore added to nothing as well.
+The order in which sets are weighed matters for those alone that are far behind.
+
+Remainders cost most of a set. They are left out where a hypothesis B without one describes the data
+as well as they can be described, so that its process noise stays nominal, and is far ahead. If B is
+true, another hypothesis R gains n nats on it with a probability of e⁻ⁿ at most, whatever R is:
+
+    E_B[p(r | R) / p(r | B)] = 1,   P_B(log p(r | R) - log p(r | B) ≥ n) ≤ e⁻ⁿ      (Markov)
+
+Once B is banned, they are weighed.
 """
 
 from __future__ import annotations
@@ -15,6 +23,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,8 +32,18 @@ from shiplog.diagnosis.decision_parts import ALL, Parts
 from shiplog.diagnosis.hypotheses import evidence
 from shiplog.diagnosis.hypotheses.hypothesis import Hypothesis, holds_one, name_of
 from shiplog.diagnosis.hypotheses.intermittent import ResidualNoise
-from shiplog.diagnosis.hypotheses.table import Hypotheses, rescored, shortened
-from shiplog.diagnosis.hypotheses.weighing import SEARCH_NATS, CauseSet, weigh, weigh_as
+from shiplog.diagnosis.hypotheses.table import Hypotheses, Table, rescored, shortened
+from shiplog.diagnosis.hypotheses.weighing import (
+    RAISED_FROM,
+    RAISING,
+    SEARCH_NATS,
+    CauseSet,
+    Rough,
+    plain_fit,
+    weigh_as,
+    weigh_plain,
+    weigh_remainders,
+)
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED
 from shiplog.diagnosis.trial.fitted import ExpectedEvidence, Fit, Point
 from shiplog.diagnosis.trial.trial import Trial
@@ -65,14 +84,19 @@ class Search:
         self._most = MOST_SETS
         self._tried: set[tuple[str, ...]] = set()
         self._expanded: set[tuple[tuple[str, ...], str]] = set()
+        self._without_remainders: dict[tuple[str, ...], Mapping[str, np.ndarray]] = {}
+        self._without_force: set[tuple[str, ...]] = set()
 
     def run(self) -> None:
         """Evaluate hypotheses until no further one is promising."""
         if () not in self._tried:
-            self.weigh((), {}, self.table.first)
+            self.weigh((), {}, self.table.first, later=True)
             self._scan_each_alone()
             if self.likely:
                 self.weigh(tuple(sorted(self.likely)), self.likely, self.table.first)
+            elif self._without_remainders:
+                self._weigh_ordinary()
+        self._add_remainders()
         while len(self._tried) < self._most:
             ranked = self.table.ranked()
             least = ranked[0].score - SEARCH_NATS
@@ -108,29 +132,87 @@ class Search:
     def cause_set(self, labels: tuple[str, ...]) -> CauseSet:
         """A set of causes, with what was weighed so far as seeds."""
         table, nothing = self.table, self.table.found.get(((), NOMINAL))
+        others = Table({key: h for key, h in table.found.items() if h.causes != labels})
+        raised, ranked = others.best(RAISED, table.banned), table.ranked()
         return CauseSet(
             table.trial, labels, self.noise, table.scale,
             nothing=None if nothing is None else nothing.evidence,
-            raised=table.found.best(RAISED, table.banned),
-            intermittent=table.found.best(INTERMITTENT, table.banned),
-            spectrum=table.parts.spectrum,
+            raised=raised, intermittent=others.best(INTERMITTENT, table.banned),
+            no_force=raised is not None and raised.causes in self._without_force,
+            spectrum=table.parts.spectrum, best=ranked[0].score if ranked else -math.inf,
         )  # fmt: skip
 
-    def weigh(self, labels: tuple[str, ...], numbers: Mapping[str, np.ndarray], at: Point) -> None:
-        """Put the hypotheses of these causes into the table."""
+    def weigh(
+        self, labels: tuple[str, ...], numbers: Mapping[str, np.ndarray], at: Point,
+        later: bool = False,
+    ) -> None:  # fmt: skip
+        """Put the hypotheses of these causes into the table; those with a remainder where they
+        could win, or `later`, once another set was weighed."""
         table = self.table
         self._tried.add(labels)
-        weighed = weigh(self.cause_set(labels), table.fixed | dict(numbers), at)
-        if not weighed:
+        plain = plain_fit(self.cause_set(labels), table.fixed | dict(numbers), at)
+        if plain is None:
             return
-        for one in weighed:
+        for one in weigh_plain(plain):
             table.found.put(one)
+        if plain.raises and (later or self._without_remainders or self._is_behind(labels)):
+            self._without_remainders[labels] = dict(numbers)
+        else:
+            self._put_remainders(plain)
         if len(labels) == 1:
             (label,) = labels
             gained = table.found[labels, NOMINAL].evidence - table.nothing.evidence
             table.alone[label] = max(gained, table.alone.get(label, -math.inf))
         table.found = shortened(table.found, [table.nothing, *table.ranked()])
+        del plain
         memory.give_back()
+        if not later:
+            self._add_remainders()
+
+    def _is_behind(self, labels: tuple[str, ...]) -> bool:
+        """Whether no remainder of these causes could win: another set describes the data with
+        nominal process noise, and is far ahead of them without one."""
+        best = self.table.ranked()[0]
+        if best.kind != NOMINAL or best.noise_factor > RAISED_FROM or best.causes == labels:
+            return False
+        found = self.table.found
+        own = max(found[labels, kind].score for kind in (NOMINAL, RAISED))
+        return own < best.score - SEARCH_NATS
+
+    def _add_remainders(self) -> None:
+        """Weigh the remainders that were left out, where they could win by now."""
+        for labels in list(self._without_remainders):
+            if self._banned(labels) or self._is_behind(labels):
+                continue
+            table, numbers = self.table, self._without_remainders.pop(labels)
+            plain = plain_fit(self.cause_set(labels), table.fixed | dict(numbers), table.first)
+            if plain is None:
+                continue
+            self._put_remainders(plain)
+            self._expanded.discard((labels, RAISED))
+            table.found = shortened(table.found, [table.nothing, *table.ranked()])
+            del plain
+            memory.give_back()
+
+    def _put_remainders(self, plain: Rough) -> None:
+        """Put a set with each kind of remainder into the table."""
+        labels = plain.of.labels
+        weighed = weigh_remainders(replace(plain, of=self.cause_set(labels)))
+        for one in weighed:
+            self.table.found.put(one)
+        if plain.raises and all(one.kind != INTERMITTENT for one in weighed):
+            self._without_force.add(labels)
+
+    def _weigh_ordinary(self) -> None:
+        """The cause that explains most with the nominal process noise, where that is more probable
+        than raised noise without a cause: it may leave nothing to a remainder."""
+        table, none = self.table, self.table.found[(), RAISED]
+        level = evidence.level(table.trial, table.first, 1.0, table.trial.fixed, RAISING)
+        allowed = (c.label for c in table.catalogue if not self._banned((c.label,)))
+        found = (evidence.candidate(table.trial, level, label) for label in allowed)
+        best = max(found, key=lambda one: one.evidence, default=None)
+        if best is not None and best.evidence > none.evidence:
+            self.weigh((best.name,), best.numbers, table.first)
 
     def _weigh_again(self, labels: tuple[str, ...], one: Hypothesis, fit: Fit) -> None:
         """A set with one cause less than the best hypothesis, with that one's noise: it may have

@@ -29,6 +29,7 @@ from shiplog.diagnosis.trial.fitted import Estimate, Fit, Level, Point, Start
 from shiplog.diagnosis.trial.trial import Trial
 
 SEARCH_NATS = 10.0  # nats behind the best, beyond which a hypothesis is not worth a linearisation
+TIE_NATS = 3.0  # nats behind the best, e³ = 20 to 1, up to which a change is fitted to its end
 FAILED_NATS = 50.0  # nats below nothing, at which a fit has failed: without effect it loses a few
 # Times the nominal process noise, from which a factor for each channel, and an intermittent force,
 # are tested
@@ -47,9 +48,11 @@ class CauseSet:
     labels        of its causes
     noise         estimates of noise from a residual
     scale         of the scores
+    best          score of the most probable hypothesis so far
     nothing       log evidence of no cause; None where it is that set
     raised        the most probable hypothesis so far with raised process noise
     intermittent  the same with an intermittent force
+    no_force      whether the causes of `raised` were found to have no such force
     spectrum      whether a change of a family has to explain some of raised noise
     """
 
@@ -60,7 +63,9 @@ class CauseSet:
     nothing: float | None = None
     raised: Hypothesis | None = None
     intermittent: Hypothesis | None = None
+    no_force: bool = False
     spectrum: bool = True
+    best: float = -math.inf
 
     @property
     def included(self) -> tuple[str, ...]:
@@ -75,6 +80,12 @@ class CauseSet:
     def hypothesis(self, fit: Fit, force: SideForce | None = None) -> Hypothesis:
         """A fit of them with its score."""
         return self.scale.hypothesis(self.labels, fit.estimate.evidence, fit, force)
+
+    def explains_more(self, raised: float) -> bool:
+        """Whether the set explains something that the best one with raised noise does not, by its
+        score with that one's noise. Otherwise its residual is the same, and so is what is estimated
+        from that."""
+        return self.raised is None or raised > self.raised.score
 
 
 @dataclass(frozen=True)
@@ -136,29 +147,34 @@ class Change:
     noise: float
 
 
-def weigh(of: CauseSet, numbers: Mapping[str, np.ndarray], at: Point) -> list[Hypothesis]:
-    """The hypotheses of these causes, one a kind of remainder; none, where their fit diverges.
+def weigh_plain(plain: Rough) -> list[Hypothesis]:
+    """A set with nominal process noise, and with one factor for all channels."""
+    of = plain.of
+    nominal = plain.fit(best(of.trial, plain.levels, NOMINAL), Remainder())
+    return [of.hypothesis(nominal), of.hypothesis(plain.fit(plain.best))]
+
+
+def weigh_remainders(plain: Rough) -> list[Hypothesis]:
+    """A set with each other kind of remainder, and with noise raised in each channel by itself."""
+    of = plain.of
+    nominal, _ = weigh_plain(plain)
+    rough = shape(plain)
+    raised = of.hypothesis(rough.fit(rough.best))
+    weighed = [raised]
+    if plain.raises:
+        force = _add_force(of, raised)
+        weighed += [force] if force is not None else []
+    alone = max((nominal, *weighed), key=lambda h: h.score)
+    return [*weighed, *_add_families(of, plain, rough, alone)]
+
+
+def plain_fit(of: CauseSet, numbers: Mapping[str, np.ndarray], at: Point) -> Rough | None:
+    """The set under one factor λ of all channels, with levels about the most probable λ under
+    `raised` and under `nominal`; None where its fit diverges.
 
     numbers   of the causes, with those of the model's own, to start from
     at        a point whose path is to start from; of no cause the point itself
     """
-    plain = _plain(of, numbers, at)
-    if plain is None:
-        return []
-    nominal = of.hypothesis(plain.fit(best(of.trial, plain.levels, NOMINAL), Remainder()))
-    rough = shape(plain)
-    raised = of.hypothesis(rough.fit(rough.best))
-    weighed = [nominal, raised]
-    if plain.raises:
-        force = _add_force(of, raised)
-        weighed += [force] if force is not None else []
-    alone = max(weighed, key=lambda h: h.score)
-    return [*weighed, *_add_families(of, plain, rough, alone)]
-
-
-def _plain(of: CauseSet, numbers: Mapping[str, np.ndarray], at: Point) -> Rough | None:
-    """The set under one factor λ of all channels, with levels about the most probable λ under
-    `raised` and under `nominal`; None where its fit diverges."""
     trial, included, point, near = of.trial, of.included, at, 1.0
     if of.labels:
         assert of.nothing is not None
@@ -196,7 +212,7 @@ def weigh_as(
 def shape(plain: Rough) -> Rough:
     """Raised noise with a factor of its own in each channel, where that is more probable than one
     for all. Factors and numbers are fitted in turn: each is off where the other one is. They start
-    from the factors that were most probable so far, and stay there where the set is far behind."""
+    from the factors that were most probable so far, and stay there where it explains no more."""
     if not plain.raises:
         return plain
     of, fit = plain.of, plain.fit(plain.best)
@@ -204,7 +220,7 @@ def shape(plain: Rough) -> Rough:
     if before is not None and before.remainder.shaped:
         fit = of.fit(fit, before.remainder)
         score = of.scale.score(fit.estimate.evidence, of.labels, RAISED)
-        rounds = 1 if score > before.score - SEARCH_NATS else 0
+        rounds = 1 if of.explains_more(score) else 0
     for _ in range(rounds):
         if not fit.diverged:
             fit = of.fit(fit, of.noise.raised(fit))
@@ -292,7 +308,7 @@ def _add_families(
     """The set together with a change of each family; `alone` is its best hypothesis without."""
     changes = [change(plain, rough, family) for family in of.trial.families]
     scores = [of.scale.score(c.value, of.labels, c.remainder.kind) for c in changes]
-    near = max((alone.score, *(score - SEARCH_NATS for score in scores)))
+    near = max((alone.score, of.best - TIE_NATS, *(score - SEARCH_NATS for score in scores)))
     for one, score in zip(changes, scores, strict=True):
         yield _add_change(of, one, alone, score >= near)
 
@@ -318,8 +334,11 @@ def _add_force(of: CauseSet, raised: Hypothesis) -> Hypothesis | None:
     """An intermittent side force instead of raised process noise, with the causes fitted together
     with it: fitted to raised noise alone they would make up for it. Less probable than noise that
     is raised in each channel by itself it is that noise, and is not counted twice. Nor is a set
-    asked that is far behind another one with raised noise."""
+    asked that is far behind another one with raised noise, or that explains no more than one that
+    has no such force."""
     if of.raised is not None and raised.score < of.raised.score - SEARCH_NATS:
+        return None
+    if of.no_force and not of.explains_more(raised.score):
         return None
     found = _fitted_with_force(of, raised)
     if found is None:
