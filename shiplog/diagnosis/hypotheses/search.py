@@ -9,13 +9,12 @@ no promising set is left. A remainder may explain a part of what a cause explain
 a cause promises about as much as the best hypothesis has, it is therefore added to nothing as well.
 The order in which sets are weighed matters for those alone that are far behind.
 
-Remainders cost most of a set. They are left out where a hypothesis B without one describes the data
-as well as they can be described, so that its process noise stays nominal, and is far ahead. If B is
-true, another hypothesis R gains n nats on it with a probability of e⁻ⁿ at most, whatever R is:
+Remainders cost most of a set S. They are left out where a larger set B ⊃ S is far ahead of S and no
+remainder R adds to it. S with R is B with R whose further numbers are zero, so that
 
-    E_B[p(r | R) / p(r | B)] = 1,   P_B(log p(r | R) - log p(r | B) ≥ n) ≤ e⁻ⁿ      (Markov)
+    max_R p(r | S, R) ≤ max_R p(r | B, R) · (Occam's factor of the further numbers, a few nats)
 
-Once B is banned, they are weighed.
+and what R could explain for S it would explain for B as well. Once B is banned, they are weighed.
 """
 
 from __future__ import annotations
@@ -34,7 +33,6 @@ from shiplog.diagnosis.hypotheses.hypothesis import Hypothesis, holds_one, name_
 from shiplog.diagnosis.hypotheses.intermittent import ResidualNoise
 from shiplog.diagnosis.hypotheses.table import Hypotheses, Table, rescored, shortened
 from shiplog.diagnosis.hypotheses.weighing import (
-    RAISED_FROM,
     RAISING,
     SEARCH_NATS,
     CauseSet,
@@ -170,14 +168,13 @@ class Search:
             self._add_remainders()
 
     def _is_behind(self, labels: tuple[str, ...]) -> bool:
-        """Whether no remainder of these causes could win: another set describes the data with
-        nominal process noise, and is far ahead of them without one."""
-        best = self.table.ranked()[0]
-        if best.kind != NOMINAL or best.noise_factor > RAISED_FROM or best.causes == labels:
+        """Whether no remainder of these causes could win: a larger set is far ahead of them, and
+        none adds to that one."""
+        best, found = self.table.ranked()[0], self.table.found
+        if best.kind != NOMINAL or not set(labels) < set(best.causes):
             return False
-        found = self.table.found
         own = max(found[labels, kind].score for kind in (NOMINAL, RAISED))
-        return own < best.score - SEARCH_NATS
+        return best.causes not in self._without_remainders and own < best.score - SEARCH_NATS
 
     def _add_remainders(self) -> None:
         """Weigh the remainders that were left out, where they could win by now."""
