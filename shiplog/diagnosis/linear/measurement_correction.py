@@ -138,7 +138,8 @@ def read(
         moving = averaged if cause.shifts else before
         for i, column in enumerate(columns.indices[cause.label]):
             step = np.zeros(cause.count)
-            step[i] = READ_STEP * sizes[cause.label][i]
+            absent = cause.first_step if here[i] == 0.0 else 0.0
+            step[i] = (absent or READ_STEP) * sizes[cause.label][i]
             # not beyond what it may be: a lag that is negative sharpens steps and noise
             ends = np.minimum(here + step, high), np.maximum(here - step, low)
             apart = ends[0][i] - ends[1][i]

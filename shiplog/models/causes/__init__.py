@@ -5,8 +5,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from shiplog.models.causes.actuators import (
+    ActuatorCoupling,
+    ActuatorDeadBand,
+    ActuatorLimit,
+    ActuatorRate,
+    ActuatorsExchanged,
+    ActuatorStuck,
+)
 from shiplog.models.causes.base import (
     Cause,
+    Orders,
     Parameter,
     ParameterEstimate,
     Setting,
@@ -37,6 +46,8 @@ CATALOGUE: tuple[Cause, ...] = (
     Current(), WindForce(), ShallowWater(), Bank(),
     Fouling(), Payload(), CrossFlowDrag(), ThrustLoss(), ThrustDrift(), RudderForce(),
     RudderOffset(), RudderLag(), RudderDelay(),
+    ActuatorLimit(), ActuatorRate(), ActuatorDeadBand(), ActuatorStuck(), ActuatorCoupling(),
+    ActuatorsExchanged(),
     HeadingOffset(), HeadingOffset(turned=True), YawRateBias(), YawRateScale(),
     ClockOffset("position"), ClockOffset("velocity"), ClockOffset("gnss"),
     ClockOffset("yaw_rate"), ClockOffset("wind"),
@@ -75,6 +86,7 @@ def testable(
 __all__ = [
     "CATALOGUE",
     "Cause",
+    "Orders",
     "Parameter",
     "ParameterEstimate",
     "Setting",

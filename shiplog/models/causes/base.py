@@ -47,6 +47,27 @@ class Parameter:
 
 
 @dataclass(frozen=True)
+class Orders:
+    """What was recorded of actuators.
+
+    extent  [A]     largest order, either way, SI; 0 where it stayed at one value
+    apart   [A, A]  root mean square of the difference of two of them
+    """
+
+    extent: np.ndarray
+    apart: np.ndarray
+
+    @classmethod
+    def of(cls, record: Record) -> Orders:
+        """Of the rows of a record."""
+        u = record.actuator
+        extent = np.abs(u).max(0, initial=0.0) * (np.ptp(u, axis=0) > 0.0 if len(u) else 0.0)
+        mean = u.T @ u / max(len(u), 1)
+        square = np.diagonal(mean)
+        return cls(extent, np.sqrt(np.maximum(square[:, None] + square - 2.0 * mean, 0.0)))
+
+
+@dataclass(frozen=True)
 class Setting:
     """The ship and the place of a cause, in addition to its numbers.
 
@@ -55,6 +76,7 @@ class Setting:
     places  [K, 2]  points x₀, y₀ that cover where the ship was, and `spacing` between them [m]
     lacking coefficients of the forces that the model has not, as they are of such a ship
     parts   forces that the model has (mmg.PARTS); None for all that the profile can have
+    orders  what was recorded of the actuators; None where that is not known
     """
 
     profile: Profile
@@ -63,6 +85,18 @@ class Setting:
     spacing: float
     lacking: Mapping[str, float] = field(default_factory=dict)
     parts: tuple[str, ...] | None = None
+    orders: Orders | None = None
+
+    def extent(self, column: int) -> float:
+        """Largest recorded order of an actuator, either way; 0 where it never moved."""
+        if self.orders is not None:
+            return float(self.orders.extent[column])
+        limits = self.profile.actuators[column].si_limits
+        return 1.0 if limits is None else max(abs(one) for one in limits)
+
+    def apart(self, one: int, other: int) -> float:
+        """Root mean square of the difference of two actuators' orders."""
+        return math.inf if self.orders is None else float(self.orders.apart[one, other])
 
     def columns(self, *kinds: str) -> list[int]:
         """Columns of the actuators of these kinds, whose force the model has."""
@@ -133,6 +167,9 @@ class Cause:
     separated_by: ClassVar[Mapping[str, str]] = {}  # other cause → manoeuvre that tells them apart
     user: ClassVar[bool] = False
     shifts: ClassVar[bool] = False  # the motion in time: what it changes is a derivative
+    # Of a reading that is linearised where the cause is absent: its step, in realistic sizes; 0 for
+    # that of every other one. A limit that is far away changes nothing.
+    first_step: ClassVar[float] = 0.0
     unit_error: ClassVar[float] = 0.0  # share by which the unit of its numbers may be wrong
     form_error: ClassVar[float] = 0.0  # share of its force that its equations may leave wrong
     forms: ClassVar[int] = 0  # of its equations, factors that are uncertain: `FORM_SPREAD`

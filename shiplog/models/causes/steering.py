@@ -8,6 +8,7 @@ from typing import Self
 
 import numpy as np
 
+from shiplog.models.causes import actuator_response as response
 from shiplog.models.causes.base import Cause, Parameter, ParameterEstimate, Setting
 from shiplog.ship_profile.profile import Profile
 from shiplog.voyages.rows.recording import Record
@@ -125,42 +126,11 @@ class RudderLag(_OnRudders):
     separated_by = {"rudder_delay": "rudder doublets of 2 to 4 s at constant revolutions"}
 
     def read(self, record: Record, p: np.ndarray) -> Record:
-        return self._with(record, _lagged(record, self._recorded(record), float(p[0])))
+        return self._with(record, response.lagged(record, self._recorded(record), float(p[0])))
 
     def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
         lag = estimates["time"].value
         return f"The {self.what} follow the recorded angle with a lag of {lag:.2f} s."
-
-
-def _lagged(record: Record, values: np.ndarray, time: float) -> np.ndarray:
-    """First-order lag of values [n, k] that go straight from row to row, exactly.
-
-    A negative time is the first-order lead, its inverse.
-    """
-    rate = np.gradient(values, record.step, axis=0)
-    starts = record.starts
-    rate[starts] = 0.0
-    if time <= 0.0:
-        return values - time * rate
-    decay = np.exp(-record.step / time)
-    # y' = (x - y)/T with x linear between rows: y₁ = a y₀ + b₀ x₀ + b₁ x₁, exact
-    b1 = 1.0 - time / record.step * (1.0 - decay)
-    b0 = 1.0 - decay - b1
-    return _filtered(values, starts, decay, b0, b1)
-
-
-def _filtered(x: np.ndarray, starts: np.ndarray, decay: float, b0: float, b1: float) -> np.ndarray:
-    """y₁ = decay y₀ + b₀ x₀ + b₁ x₁; a stretch begins in balance with its first row. All rows at
-    once, as the lower bidiagonal system y₁ - decay y₀ = b₀ x₀ + b₁ x₁."""
-    from scipy.linalg import solve_banded  # 0.1 s to load
-
-    moving = np.logical_not(starts)
-    moving[:1] = False
-    right = x.copy()
-    right[moving] = (b0 * np.roll(x, 1, axis=0) + b1 * x)[moving]
-    bands = np.ones((2, len(x)))
-    bands[1] = -decay * np.roll(moving, -1)
-    return solve_banded((1, 0), bands, right)
 
 
 @dataclass(frozen=True)
@@ -182,7 +152,7 @@ class RudderDelay(_OnRudders):
         return False  # a small one is a small lag
 
     def read(self, record: Record, p: np.ndarray) -> Record:
-        return self._with(record, record.later(self._recorded(record), -float(p[0])))
+        return self._with(record, response.delayed(record, self._recorded(record), float(p[0])))
 
     def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
         return f"The {self.what} act {estimates['time'].value:.2f} s later than recorded."

@@ -1,0 +1,405 @@
+"""Causes in an actuator: it does not do what was recorded of it. One number of its model each.
+
+`actuator_response` has the model and its equations. Each cause is tested of every unit by itself,
+and of all units of a kind together. What is tested is an order that moved: of a unit that stood
+still nothing is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
+
+import numpy as np
+
+from shiplog.models.causes import actuator_response as response
+from shiplog.models.causes.base import Cause, Parameter, ParameterEstimate, Setting
+from shiplog.nomenclature.numbers import figure
+from shiplog.voyages.rows.recording import Record
+
+TURNING, PUSHING = ("rudder", "azimuth"), ("propeller", "thruster")
+GROUPS = tuple(f"{kind}s" for kind in (*TURNING, *PUSHING))
+SPOKEN = {"rad": ("deg", np.radians(1.0)), "rev/s": ("rev/s", 1.0), "1": ("1", 1.0)}
+STILL = 1e-9  # of an order's unit: it has not moved
+ALIKE = 0.02  # share of the extent by which two orders have to differ, to be told from each other
+STRETCHES = 4  # of a campaign, in which a unit may be stuck
+
+
+@dataclass(frozen=True)
+class _OnUnits(Cause):
+    """Of these units of one kind.
+
+    actuator   the unit's name, or the kind's in the plural
+    units      the profile's names
+    unit       of the recorded order, SI
+    """
+
+    actuator: str = ""
+    units: tuple[str, ...] = ()
+    unit: str = "1"
+
+    kind = "ship"
+    kinds: ClassVar[tuple[str, ...]] = (*TURNING, *PUSHING)
+    still = "no actuator's order moves in these voyages"
+
+    @property
+    def label(self) -> str:
+        return f"{self.name}:{self.actuator}" if self.actuator else self.name
+
+    @property
+    def nominal(self) -> bool:
+        return False  # what of it the nominal voyages have, the coefficients have
+
+    def compatible(self, label: str) -> bool:
+        """With another one of its name where both are of single units."""
+        name, _, unit = label.partition(":")
+        apart = self.actuator not in ("", *GROUPS) and unit not in (self.actuator, "", *GROUPS)
+        return name != self.name or apart
+
+    def missing(self, setting: Setting) -> str | None:
+        return None if self.each(setting) else self.still
+
+    def each(self, setting: Setting) -> tuple[Cause, ...]:
+        found: list[Cause] = []
+        for kind in self.kinds:
+            moved = [i for i in setting.columns(kind) if setting.extent(i) > STILL]
+            of = [setting.profile.actuators[i] for i in moved]
+            if len(of) > 1 and len({one.si_unit for one in of}) == 1:
+                found.append(self._made(f"{kind}s", of))
+            found += [self._made(one.name, [one]) for one in of]
+        return tuple(found)
+
+    def _made(self, name: str, of: Sequence) -> Self:
+        return replace(self, actuator=name, units=tuple(one.name for one in of), unit=of[0].si_unit)
+
+    def columns_of(self, names: Sequence[str]) -> list[int]:
+        """Columns of its units among the profile's actuators."""
+        return [i for i, name in enumerate(names) if name in self.units]
+
+    def reach(self, setting: Setting) -> float:
+        """Largest recorded order of its units, either way."""
+        columns = self.columns_of(setting.profile.actuator_names)
+        return max((setting.extent(i) for i in columns), default=1.0)
+
+    def read(self, record: Record, p: np.ndarray) -> Record:
+        columns = self.columns_of(record.profile.actuator_names)
+        if not columns or not np.any(p):
+            return record
+        actuator = record.actuator.copy()
+        actuator[:, columns] = self.acting(record, actuator[:, columns], p)
+        return replace(record, actuator=actuator)
+
+    def acting(self, record: Record, recorded: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """What acts [n, k] of what was recorded of its units."""
+        raise NotImplementedError
+
+    def does(self, verb: str, more: str) -> str:
+        """A sentence of its units, with a verb of one or of several."""
+        if self.actuator in GROUPS:
+            return f"The {self.actuator} {verb} {more}."
+        single = {"have": "has", "are": "is", "go": "goes"}.get(verb, f"{verb}s")
+        return f"The actuator {self.units[0] if self.units else ''} {single} {more}."
+
+    def spoken(self, value: np.ndarray, per: str = "") -> tuple[np.ndarray, str]:
+        """A value in the unit that people use, and that unit."""
+        unit, size = SPOKEN[self.unit]
+        return value / size, unit + per
+
+
+@dataclass(frozen=True)
+class ActuatorLimit(_OnUnits):
+    """It turns, or pushes, no farther: L = 1/q.
+
+    Size: half of what was ordered. A rudder is limited to 35 deg mechanically and is ordered to
+    that (SOLAS II-1/29); a damaged machine or an engine in an emergency gives about a half (MSC.1/
+    Circ.1416 has a main engine's slow-down at 40 to 60 % of its revolutions)."""
+
+    name = "actuator_limit"
+    kinds = ("rudder", *PUSHING)
+    story = "An actuator goes no farther than a limit."
+    equation = "u = min(max(u_recorded, -{limit:.3g}), {limit:.3g})"
+    remedy = (
+        "Drive this unit to its ends and see how far it goes: end switches, the pump, a limit that "
+        "is set in its controller. Until then simulate with the extended model."
+    )
+    parameters = (Parameter("limit", "1", 2.0, 0.05),)
+    first_step = 1.0  # half of what was ordered: a smaller one limits nothing
+    separated_by = {
+        "thrust_loss": "runs at small and at large orders: a limit leaves the small ones as they "
+        "were",
+        "rudder_force": "small rudder angles: a limit leaves them as they were",
+    }
+
+    @property
+    def renames(self) -> bool:
+        return True
+
+    def sizes(self, setting: Setting) -> np.ndarray:
+        return np.array([2.0 / self.reach(setting)])
+
+    def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros(1), np.array([50.0 / self.reach(setting)])
+
+    def acting(self, record: Record, recorded: np.ndarray, p: np.ndarray) -> np.ndarray:
+        return response.limited(recorded, float(p[0]))
+
+    def practical(self, p: np.ndarray, setting: Setting) -> np.ndarray:
+        return np.asarray(p[..., 0] * self.reach(setting) * (1.0 - 0.05) > 1.0)
+
+    def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+        return {"limit": self.spoken(1.0 / np.maximum(p[..., 0], 1e-6))}
+
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
+        limit = estimates["limit"]
+        return self.does("go", f"no farther than {_worded(limit)}, whatever is recorded")
+
+
+@dataclass(frozen=True)
+class ActuatorRate(_OnUnits):
+    """It moves slower than recorded: R = 1/q.
+
+    Size: from amidships to its end in 3 s. A steering machine takes 28 s for 65 deg (SOLAS
+    II-1/29), that is 15 s for 35 deg, on a ship of 100 m and more; by Froude 3 s on one of 4 m."""
+
+    name = "actuator_rate"
+    story = "An actuator moves slower than recorded."
+    equation = "|u̇| ≤ {rate:.3g}"
+    remedy = (
+        "Time this unit from end to end: the pump, the voltage, a ramp in its controller. An order "
+        "is no feedback. Until then simulate with the extended model."
+    )
+    parameters = (Parameter("rate", "1", 3.0, 0.3),)
+    first_step = 1.0
+    separated_by = {
+        "rudder_lag": "small and large orders: a rate delays the large ones, a lag all alike",
+        "rudder_delay": "small and large orders: a rate delays the large ones, a delay all alike",
+    }
+
+    def sizes(self, setting: Setting) -> np.ndarray:
+        return np.array([self.parameters[0].prior / self.reach(setting)])
+
+    def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros(1), np.array([100.0 / self.reach(setting)])
+
+    def acting(self, record: Record, recorded: np.ndarray, p: np.ndarray) -> np.ndarray:
+        return response.rate_limited(record, recorded, float(p[0]))
+
+    def practical(self, p: np.ndarray, setting: Setting) -> np.ndarray:
+        return np.asarray(p[..., 0] * self.reach(setting) > self.parameters[0].least)
+
+    def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+        return {"rate": self.spoken(1.0 / np.maximum(p[..., 0], 1e-6), "/s")}
+
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
+        return self.does("move", f"no faster than {_worded(estimates['rate'])}")
+
+
+@dataclass(frozen=True)
+class ActuatorDeadBand(_OnUnits):
+    """Backlash of what turns (play), dead zone of what pushes: nothing acts near zero.
+
+    Size: a tenth of what is ordered. The pulse width of a small electric thruster has a zone of
+    50 µs of 800 in which it stands still; a steering gear's play is a degree or two of 35."""
+
+    name = "actuator_dead_band"
+    story = "An actuator has a dead band."
+    equation = "u = band(u_recorded), {width:.3g} wide"
+    remedy = (
+        "Move the order of this unit slowly through zero, and see when it follows: worn joints, or "
+        "the dead zone of its drive. Set that zone in the profile where it is its drive's."
+    )
+    parameters = (Parameter("width", "1", 0.15, 0.02),)
+    separated_by = {"rudder_lag": "large orders: a lag delays them, a dead band hardly"}
+
+    @property
+    def _turns(self) -> bool:
+        return self.unit == "rad"
+
+    @property
+    def renames(self) -> bool:
+        return not self._turns
+
+    def sizes(self, setting: Setting) -> np.ndarray:
+        return np.array([self.parameters[0].prior * self.reach(setting)])
+
+    def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros(1), np.array([2.0 * self.reach(setting)])
+
+    def acting(self, record: Record, recorded: np.ndarray, p: np.ndarray) -> np.ndarray:
+        if self._turns:
+            return response.play(record, recorded, float(p[0]))
+        return response.dead_zone(recorded, float(p[0]))
+
+    def practical(self, p: np.ndarray, setting: Setting) -> np.ndarray:
+        return np.asarray(p[..., 0] > self.parameters[0].least * self.reach(setting))
+
+    def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+        return {"width": self.spoken(p[..., 0])}
+
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
+        what = "play" if self._turns else "a dead zone about zero"
+        return self.does("have", f"{what} of {_worded(estimates['width'])}")
+
+
+@dataclass(frozen=True)
+class ActuatorStuck(_OnUnits):
+    """It stays at one value for a stretch: in each quarter of the campaign a share h of its order
+    is lost, and h times the value c acts instead.
+
+    Size: all of it, h = 1, at a value of half its reach."""
+
+    name = "actuator_stuck"
+    story = "An actuator is stuck for a stretch."
+    equation = "u = (1 - h) u_recorded + h {value:.3g}"
+    remedy = (
+        "Look at this unit in the stretch that is named: it did not follow its order. Leave that "
+        "stretch out where it was repaired."
+    )
+    parameters = ()
+    separated_by = {"thrust_loss": "the same order in the stretch and outside it"}
+
+    def each(self, setting: Setting) -> tuple[Cause, ...]:
+        return tuple(c for c in super().each(setting) if len(c.units) == 1)  # type: ignore[attr-defined]
+
+    @property
+    def count(self) -> int:
+        return STRETCHES + 1
+
+    def sizes(self, setting: Setting) -> np.ndarray:
+        return np.append(np.ones(STRETCHES), 0.5 * self.reach(setting))
+
+    def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
+        reach = self.reach(setting)
+        return (
+            np.append(np.full(STRETCHES, -0.5), -1.5 * reach),
+            np.append(np.full(STRETCHES, 1.5), 1.5 * reach),
+        )
+
+    def acting(self, record: Record, recorded: np.ndarray, p: np.ndarray) -> np.ndarray:
+        at = np.minimum((record.share * STRETCHES).astype(int), STRETCHES - 1)
+        lost = p[at][:, None]
+        return (1.0 - lost) * recorded + lost * p[-1]
+
+    def practical(self, p: np.ndarray, setting: Setting) -> np.ndarray:
+        return np.asarray(p[..., :STRETCHES].max(-1) > 0.2)
+
+    def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+        return {
+            "value": self.spoken(p[..., -1]),
+            "share": (p[..., :STRETCHES].max(-1), "1"),
+            "part": (1.0 + p[..., :STRETCHES].argmax(-1).astype(float), "1"),
+        }
+
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
+        part = round(estimates["part"].value)
+        share = min(max(estimates["share"].value, 0.0), 1.0)
+        return self.does(
+            "are", f"stuck at {_worded(estimates['value'])} for {share:.0%} of quarter {part} of "
+            "the campaign",
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _OnPairs(_OnUnits):
+    """Of two units of one kind, whose orders differ.
+
+    other   the profile's name of the second one
+    """
+
+    other: str = ""
+    still = "no two actuators of a kind have orders that differ"
+
+    @property
+    def renames(self) -> bool:
+        return True
+
+    def compatible(self, label: str) -> bool:
+        return label.partition(":")[0] != self.name
+
+    def each(self, setting: Setting) -> tuple[Cause, ...]:
+        found = []
+        for kind in self.kinds:
+            columns = setting.columns(kind)
+            for i in columns:
+                for j in columns:
+                    one, two = (setting.profile.actuators[k] for k in (i, j))
+                    apart = setting.apart(i, j) > ALIKE * max(setting.extent(i), setting.extent(j))
+                    if self._pair(i, j) and apart and one.si_unit == two.si_unit:
+                        pair = replace(
+                            self, actuator=f"{one.name}{self._joint}{two.name}",
+                            units=(one.name, two.name), unit=one.si_unit, other=two.name,
+                        )  # fmt: skip
+                        found.append(pair)
+        return tuple(found)
+
+    _joint: ClassVar[str] = "+"
+
+    def _pair(self, i: int, j: int) -> bool:
+        return i < j
+
+
+@dataclass(frozen=True)
+class ActuatorCoupling(_OnPairs):
+    """It follows a share q of the order of another unit.
+
+    Size: a third. No figure is published; it is what a crossed wire or a shared shaft leaves."""
+
+    name = "actuator_coupling"
+    story = "An actuator follows a share of another one's order."
+    equation = "u₁ = (1 - {share:.2f}) u₁,recorded + {share:.2f} u₂,recorded"
+    remedy = (
+        "Move the other unit alone, and see whether this one follows: mixed signals, an allocation "
+        "that the recorder does not know, a linkage."
+    )
+    parameters = (Parameter("share", "1", 0.35, 0.03, low=-1.5, high=1.5),)
+    separated_by = {"thrust_loss": "one unit at a time, the other at zero"}
+    _joint = "<"
+
+    def _pair(self, i: int, j: int) -> bool:
+        return i != j
+
+    def read(self, record: Record, p: np.ndarray) -> Record:
+        return _mixed(record, self.units, (float(p[0]), 0.0))
+
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
+        share = estimates["share"].value
+        return self.does("follow", f"{share:.0%} of the order of {self.other}")
+
+
+@dataclass(frozen=True)
+class ActuatorsExchanged(_OnPairs):
+    """Each of two units does what is recorded of the other one: q = 1; between, a share of it.
+
+    Size: all of it."""
+
+    name = "actuators_exchanged"
+    story = "Two actuators are exchanged."
+    equation = "u₁ = u₂,recorded,  u₂ = u₁,recorded"
+    remedy = "Exchange their two names in the profile, and ingest these logs again."
+    parameters = (Parameter("share", "1", 1.0, 0.5, low=-0.5, high=1.5),)
+    separated_by = {"actuator_coupling": "one unit at a time, the other at zero"}
+
+    def read(self, record: Record, p: np.ndarray) -> Record:
+        return _mixed(record, self.units, (float(p[0]), float(p[0])))
+
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
+        one = self.units[0] if self.units else ""
+        return f"The actuators {one} and {self.other} are exchanged."
+
+
+def _mixed(record: Record, units: Sequence[str], shares: tuple[float, float]) -> Record:
+    """Each of two units with a share of the other one's order."""
+    names = record.profile.actuator_names
+    if not any(shares) or any(one not in names for one in units):
+        return record
+    i, j = (names.index(one) for one in units)
+    actuator = record.actuator.copy()
+    one, two = record.actuator[:, i], record.actuator[:, j]
+    actuator[:, i] = one + shares[0] * (two - one)
+    actuator[:, j] = two + shares[1] * (one - two)
+    return replace(record, actuator=actuator)
+
+
+def _worded(one: ParameterEstimate) -> str:
+    return f"{figure(one.value, 3)} {one.unit}" if one.unit != "1" else figure(one.value, 3)
