@@ -52,9 +52,13 @@ def test_bent_instruments_are_put_right(label, profile):
 
 
 @SHIPS
-@pytest.mark.parametrize("cause", [c for c in CATALOGUE if c.reads], ids=lambda c: c.label)
+@pytest.mark.parametrize(
+    "cause", [c for c in CATALOGUE if c.reads and not c.name.startswith("actuator")],
+    ids=lambda c: c.label,
+)  # fmt: skip
 def test_inverse_undoes_read(cause, profile):
-    """What the instruments will show, of what was. A lag forgets nothing but its first seconds."""
+    """What the instruments will show, of what was. A lag forgets nothing but its first seconds; a
+    limit or a dead band has no inverse, and none is asked for: it changes no instrument."""
     cause = cause.on(setting(profile))
     observed = closed.record(profile)
     numbers = sized(cause)

@@ -7,6 +7,7 @@ still nothing is known.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
@@ -15,6 +16,7 @@ import numpy as np
 
 from shiplog.models.causes import actuator_response as response
 from shiplog.models.causes.base import Cause, Parameter, ParameterEstimate, Setting
+from shiplog.models.mmg.estimate import GRAVITY
 from shiplog.nomenclature.numbers import figure
 from shiplog.voyages.rows.recording import Record
 
@@ -56,6 +58,10 @@ class _OnUnits(Cause):
         name, _, unit = label.partition(":")
         apart = self.actuator not in ("", *GROUPS) and unit not in (self.actuator, "", *GROUPS)
         return name != self.name or apart
+
+    def on(self, setting: Setting) -> Cause:
+        """Of the first units that it can be tested of."""
+        return next(iter(self.each(setting)), self)
 
     def missing(self, setting: Setting) -> str | None:
         return None if self.each(setting) else self.still
@@ -111,9 +117,8 @@ class _OnUnits(Cause):
 class ActuatorLimit(_OnUnits):
     """It turns, or pushes, no farther: L = 1/q.
 
-    Size: half of what was ordered. A rudder is limited to 35 deg mechanically and is ordered to
-    that (SOLAS II-1/29); a damaged machine or an engine in an emergency gives about a half (MSC.1/
-    Circ.1416 has a main engine's slow-down at 40 to 60 % of its revolutions)."""
+    Size: a third of what was ordered is left. No figure is published: it is a rudder of 35 deg that
+    stops at 12, or an engine that its protection slows down to dead slow."""
 
     name = "actuator_limit"
     kinds = ("rudder", *PUSHING)
@@ -123,8 +128,8 @@ class ActuatorLimit(_OnUnits):
         "Drive this unit to its ends and see how far it goes: end switches, the pump, a limit that "
         "is set in its controller. Until then simulate with the extended model."
     )
-    parameters = (Parameter("limit", "1", 2.0, 0.05),)
-    first_step = 1.0  # half of what was ordered: a smaller one limits nothing
+    parameters = (Parameter("limit", "1", 3.0, 0.05),)
+    first_step = 0.7  # about half of what was ordered: a smaller one limits nothing
     separated_by = {
         "thrust_loss": "runs at small and at large orders: a limit leaves the small ones as they "
         "were",
@@ -136,7 +141,7 @@ class ActuatorLimit(_OnUnits):
         return True
 
     def sizes(self, setting: Setting) -> np.ndarray:
-        return np.array([2.0 / self.reach(setting)])
+        return np.array([self.parameters[0].prior / self.reach(setting)])
 
     def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(1), np.array([50.0 / self.reach(setting)])
@@ -159,8 +164,8 @@ class ActuatorLimit(_OnUnits):
 class ActuatorRate(_OnUnits):
     """It moves slower than recorded: R = 1/q.
 
-    Size: from amidships to its end in 3 s. A steering machine takes 28 s for 65 deg (SOLAS
-    II-1/29), that is 15 s for 35 deg, on a ship of 100 m and more; by Froude 3 s on one of 4 m."""
+    Size: twice as slow as a steering machine may be, 28 s for 65 deg (SOLAS II-1/29.3): 30 s from
+    amidships to its end on a ship of 100 m, by Froude 10 √(length/g)."""
 
     name = "actuator_rate"
     story = "An actuator moves slower than recorded."
@@ -169,24 +174,28 @@ class ActuatorRate(_OnUnits):
         "Time this unit from end to end: the pump, the voltage, a ramp in its controller. An order "
         "is no feedback. Until then simulate with the extended model."
     )
-    parameters = (Parameter("rate", "1", 3.0, 0.3),)
+    parameters = (Parameter("rate", "1", 10.0, 0.5),)  # √(length/g), from amidships to its end
     first_step = 1.0
     separated_by = {
         "rudder_lag": "small and large orders: a rate delays the large ones, a lag all alike",
         "rudder_delay": "small and large orders: a rate delays the large ones, a delay all alike",
     }
 
+    def _time(self, setting: Setting) -> float:
+        """√(length/g) over the reach of its units [s/unit]."""
+        return math.sqrt(setting.scale["length"] / GRAVITY) / self.reach(setting)
+
     def sizes(self, setting: Setting) -> np.ndarray:
-        return np.array([self.parameters[0].prior / self.reach(setting)])
+        return np.array([self.parameters[0].prior * self._time(setting)])
 
     def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
-        return np.zeros(1), np.array([100.0 / self.reach(setting)])
+        return np.zeros(1), np.array([300.0 * self._time(setting)])
 
     def acting(self, record: Record, recorded: np.ndarray, p: np.ndarray) -> np.ndarray:
         return response.rate_limited(record, recorded, float(p[0]))
 
     def practical(self, p: np.ndarray, setting: Setting) -> np.ndarray:
-        return np.asarray(p[..., 0] * self.reach(setting) > self.parameters[0].least)
+        return np.asarray(p[..., 0] > self.parameters[0].least * self._time(setting))
 
     def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
         return {"rate": self.spoken(1.0 / np.maximum(p[..., 0], 1e-6), "/s")}
@@ -341,13 +350,14 @@ class _OnPairs(_OnUnits):
 
 @dataclass(frozen=True)
 class ActuatorCoupling(_OnPairs):
-    """It follows a share q of the order of another unit.
+    """It follows a share q of the order of another unit; of its own order a part of q is lost,
+    between none (both orders add) and all (one takes the other's place), ½ + g of it.
 
     Size: a third. No figure is published; it is what a crossed wire or a shared shaft leaves."""
 
     name = "actuator_coupling"
     story = "An actuator follows a share of another one's order."
-    equation = "u₁ = (1 - {share:.2f}) u₁,recorded + {share:.2f} u₂,recorded"
+    equation = "u₁ = u₁,recorded + {share:.2f} (u₂,recorded - (½ + g) u₁,recorded)"
     remedy = (
         "Move the other unit alone, and see whether this one follows: mixed signals, an allocation "
         "that the recorder does not know, a linkage."
@@ -356,11 +366,22 @@ class ActuatorCoupling(_OnPairs):
     separated_by = {"thrust_loss": "one unit at a time, the other at zero"}
     _joint = "<"
 
+    @property
+    def count(self) -> int:
+        return 2
+
+    def sizes(self, setting: Setting) -> np.ndarray:
+        return np.array([self.parameters[0].prior, 0.5])
+
+    def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
+        one = self.parameters[0]
+        return np.array([one.low, -1.0]), np.array([one.high, 1.0])
+
     def _pair(self, i: int, j: int) -> bool:
         return i != j
 
     def read(self, record: Record, p: np.ndarray) -> Record:
-        return _mixed(record, self.units, (float(p[0]), 0.0))
+        return _mixed(record, self.units, ((float(p[0]), float(p[0] * (0.5 + p[1]))), (0.0, 0.0)))
 
     def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
         share = estimates["share"].value
@@ -381,23 +402,26 @@ class ActuatorsExchanged(_OnPairs):
     separated_by = {"actuator_coupling": "one unit at a time, the other at zero"}
 
     def read(self, record: Record, p: np.ndarray) -> Record:
-        return _mixed(record, self.units, (float(p[0]), float(p[0])))
+        share = float(p[0])
+        return _mixed(record, self.units, ((share, share), (share, share)))
 
     def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
         one = self.units[0] if self.units else ""
         return f"The actuators {one} and {self.other} are exchanged."
 
 
-def _mixed(record: Record, units: Sequence[str], shares: tuple[float, float]) -> Record:
-    """Each of two units with a share of the other one's order."""
+def _mixed(
+    record: Record, units: Sequence[str], shares: tuple[tuple[float, float], tuple[float, float]]
+) -> Record:
+    """Each of two units with a share of the other one's order, and less by a share of its own."""
     names = record.profile.actuator_names
-    if not any(shares) or any(one not in names for one in units):
+    if not units or not any(map(any, shares)) or any(one not in names for one in units):
         return record
     i, j = (names.index(one) for one in units)
     actuator = record.actuator.copy()
     one, two = record.actuator[:, i], record.actuator[:, j]
-    actuator[:, i] = one + shares[0] * (two - one)
-    actuator[:, j] = two + shares[1] * (one - two)
+    actuator[:, i] = one + shares[0][0] * two - shares[0][1] * one
+    actuator[:, j] = two + shares[1][0] * one - shares[1][1] * two
     return replace(record, actuator=actuator)
 
 
