@@ -43,6 +43,13 @@ PARAMETERS = {  # as the report prints them
     "rudder_offset": "`port`, `starboard` or `angle` (deg, acting minus recorded)",
     "rudder_lag": "`time` (s, of the first order)",
     "rudder_delay": "`time` (s)",
+    "actuator_limit": "`limit` (deg, rev/s or 1), `actuator` (a unit, or all of a kind)",
+    "actuator_rate": "`rate` (deg/s, rev/s/s or 1/s), `actuator`",
+    "actuator_dead_band": "`width` (deg, rev/s or 1), `actuator`",
+    "actuator_stuck": "`value` (deg, rev/s or 1), `share` of the quarter of the campaign `part`, "
+    "`actuator`",
+    "actuator_coupling": "`share` (of the other unit's order), `actuator` (`one<other`)",
+    "actuators_exchanged": "`share` (1: wholly), `actuator` (`one+other`)",
     "heading_offset": "`angle` (deg, measured minus true)",
     "yaw_rate_bias": "`value` (deg/s, measured minus true)",
     "yaw_rate_scale": "`value` (measured over true)",
@@ -52,11 +59,16 @@ PARAMETERS = {  # as the report prints them
     "wind_direction_offset": "`angle` (deg, measured minus true)",
     "wind_speed_scale": "`value` (measured over true)",
 }
+REACH = "of the largest order"
 WITHOUT_PARAMETERS = {  # numbers that are made for each ship: realistic and practical size
     "shallow_water": tuple(f"{size:g}" for size in (ShallowWater.realistic, ShallowWater.least)),
     "rudder_offset": tuple(
         f"{np.degrees(size):.3g} deg" for size in (RudderOffset.realistic, RudderOffset.least)
     ),
+    "actuator_limit": (f"a third {REACH}", f"0.95 {REACH}"),
+    "actuator_rate": ("10 √(length/g) from zero to the largest order", "0.5 √(length/g)"),
+    "actuator_dead_band": (f"0.15 {REACH}", f"0.02 {REACH}"),
+    "actuator_stuck": ("all of the order", "0.2 of a quarter"),
 }
 NEEDED = {
     "yaw rate": "a yaw rate sensor",
