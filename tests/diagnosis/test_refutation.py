@@ -24,10 +24,15 @@ def gain(low: float, high: float) -> Gain:
 
 class HeldOut:
     """Gains by what is named, and by the name that is taken away; what was tested is kept. Of the
-    names that are `hidden` the windows feel nothing."""
+    names that are `hidden` the windows feel nothing. `taken` is the share of the excess over the
+    nominal voyages that is taken away."""
 
-    def __init__(self, gains, worths=None, hidden=()):
+    def __init__(self, gains, worths=None, hidden=(), taken=1.0):
         self.gains, self.worths, self.asked, self.hidden = gains, worths or {}, [], hidden
+        self.taken = taken
+
+    def share_of_excess(self, gain):
+        return self.taken
 
     def gain(self, decision):
         labels = tuple(one.cause.label for one in decision.named)
@@ -112,6 +117,32 @@ def test_with_a_remainder_a_sure_gain_names_the_cause(trial):
     )
     assert (decision.verdict, gained.low) == ("named", BETTER[0])
     assert [one.cause.label for one in decision.named] == ["drag"]
+
+
+@pytest.mark.parametrize(("taken", "verdict"), [(0.32, "unknown"), (0.49, "unknown"),
+                                                (0.5, "named"), (0.9, "named")])  # fmt: skip
+def test_no_name_is_given_next_to_a_larger_unknown(trial, taken, verdict):
+    """A remainder is stated, and the cause takes away less than half of what these voyages have
+    more than the nominal ones: it is a candidate, and the headline is the remainder's."""
+    made = weighed.search(trial, {(DRAG, RAISED): 1.0} | RAISED_ALONE)
+    decision, found, _, _ = judge(made, HeldOut({DRAG: BETTER}, taken=taken))
+    assert (decision.verdict, bool(decision.named)) == (verdict, verdict == "named")
+    assert found.names["drag"] > 0.9 and found.remainder == RAISED
+    assert ("drag" in decision.rejected) == (verdict == "unknown")
+    if verdict == "unknown":
+        assert f"they take away {taken:.0%} of the error" in decision.rejected["drag"]
+
+
+@pytest.mark.parametrize("kind", [NOMINAL, RAISED])
+def test_a_small_gain_is_enough_where_no_more_than_an_error_of_the_equations_remains(trial, kind):
+    """The rest of the error is what the model has on its nominal voyages, too."""
+    made = weighed.search(
+        trial, {(DRAG, NOMINAL): 0.01, (DRAG, RAISED): 0.99} if kind == RAISED else
+        {(DRAG, NOMINAL): 1.0},
+        evidence={(DRAG, NOMINAL): 100.0, (DRAG, RAISED): 101.0},
+    )  # fmt: skip
+    decision, _, _, _ = judge(made, HeldOut({DRAG: BETTER}, taken=0.2))
+    assert decision.verdict == "named"
 
 
 def test_what_is_significantly_worse_is_dropped_and_the_next_is_judged(trial):

@@ -108,6 +108,13 @@ class HeldOut(Rollouts):
         """1 - Σ L_after/Σ L_before of what is named over nothing, with its interval."""
         return self.gain_between(self.losses_before, self.parts(self.states_after(decision)))
 
+    def share_of_excess(self, gain: Gain) -> float:
+        """(L_before - L_after)/(L_before - L_nominal), with the mean L of the nominal windows; of
+        all of L where there are none, or where these are no worse."""
+        level = self._level or 0.0
+        excess = gain.before - level if level < gain.before else gain.before
+        return (gain.before - gain.after) / max(excess, 1e-12)
+
     def changes_velocity(self, decision: Decision, one: Named) -> bool:
         """Whether a named cause itself changes the velocities that the windows compare. The clock
         of the position does not; numbers that are fitted together with it may."""

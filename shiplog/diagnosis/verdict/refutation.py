@@ -11,8 +11,10 @@ to an unrecorded thruster. They lack its force; the helm answers it, and a rudde
 would make up for it. The likelihood has the force in its noise.
 
 With a remainder the noise is not that of the likelihood, and a log Bayes factor is no proof. Causes
-are then named only if the interval of their joint gain lies above zero. A remainder so slight that
-it can be an error of the causes' own equations puts none in doubt.
+are then named only if the interval of their joint gain lies above zero, and if they take away MOST
+of the held-out error beyond that of the nominal voyages. Otherwise the remainder is the larger part
+of the answer, and they are candidates. A remainder so slight that it can be an error of the causes'
+own equations puts none in doubt.
 
 Nor is a log Bayes factor a proof of causes that take the place of a refuted one, which was more
 probable. Their joint gain has to be significant, too. Next to other named causes, so has the own
@@ -55,6 +57,11 @@ class Judge(Protocol):
         """Whether the cause itself changes what is compared."""
         ...
 
+    def share_of_excess(self, gain: Gain) -> float:
+        """Of what the error is greater than that of the nominal voyages, the share that a gain
+        takes away."""
+        ...
+
 
 def _why_in_doubt(
     search: Search, found: Posterior, decision: Decision, first: Collection[str]
@@ -77,6 +84,28 @@ def _why_in_doubt(
     if remains >= thresholds.STATED and not posteriors.slight(search.table, best):
         return "the catalogue does not explain all of the trial"
     return ""
+
+
+def _doubt(
+    search: Search, found: Posterior, decision: Decision, first: Collection[str], held: Judge,
+    gain: Gain,
+) -> str:  # fmt: skip
+    """Why nothing is named, with the figure that says so; empty where something is."""
+    why = _why_in_doubt(search, found, decision, first)
+    if why and not gain.real:
+        return (
+            f"{why}, so a cause is named only if it significantly reduces the held-out error: "
+            f"here by {gain.low:.1%} to {gain.high:.1%}"
+        )
+    if not why or why == TAKES_A_PLACE or not search.table.parts.share_of_causes:
+        return ""
+    share = held.share_of_excess(gain)
+    if share >= thresholds.MOST:
+        return ""
+    return (
+        f"{why}, and what remains unknown is more than the causes explain: they take away "
+        f"{share:.0%} of the error that these voyages have more than the nominal ones"
+    )
 
 
 def _judges(held: Judge, decision: Decision, one: Named) -> bool:
@@ -154,12 +183,7 @@ def judge(
             bans[names] = why
             search.exclude(*names)
             continue
-        why = "" if gain.real else _why_in_doubt(search, found, decision, first)
-        if why:
-            why += (
-                ", so a cause is named only if it significantly reduces the held-out error: "
-                f"here by {gain.low:.1%} to {gain.high:.1%}"
-            )
+        if why := _doubt(search, found, decision, first, held, gain):
             doubted = dict.fromkeys(sorted(named), why)
             if not named <= first:  # held-out voyages confirm no answer: all are listed
                 search.table.banned.difference_update(bans)
