@@ -15,6 +15,7 @@ import polars as pl
 
 from shiplog.exceptions import ModelError, listed
 from shiplog.nomenclature.channels import STATE, VELOCITY, WIND
+from shiplog.nomenclature.frames import in_body_axes
 from shiplog.simulation import coverage, discrepancy
 from shiplog.simulation.controls import STEERING_CAUSES, Controls, Gear, controls
 from shiplog.simulation.discrepancy import Discrepancy
@@ -207,9 +208,15 @@ class Sailor:
         seed: int = 0,
         rudder_rate: float = 0.0,
         seconds: float | None = None,
+        approach: np.ndarray | None = None,
+        motion: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> tuple[Sailed, Outside]:
         """A manoeuvre from a straight approach, and where the model as it stands left the training
-        data in it. The first of the members is the model as it stands. Raises ModelError."""
+        data in it. The first of the members is the model as it stands. Raises ModelError.
+
+        approach   [A] of the actuators, SI, instead of those at which the model keeps the speed
+        motion     heading, sway and yaw rate at the order, SI
+        """
         own = self.speed if speed is None else speed
         if not own > 0.0:
             raise ModelError(
@@ -217,6 +224,8 @@ class Sailor:
                 hint="give --speed the approach speed in m/s.",
             )
         sticks = self.controls(own, rudder_rate)
+        if approach is not None:
+            sticks = replace(sticks, approach=np.where(sticks.steering != 0.0, 0.0, approach))
         if not isinstance(manoeuvre, Schedule) and not sticks.steers and manoeuvre.kind != "stop":
             raise ModelError(
                 f"{self.profile.ship.name} has neither a rudder nor an azimuth astern, and "
@@ -226,6 +235,7 @@ class Sailor:
         refuse_unknown(manoeuvre, self.profile.actuator_names)
         start = np.zeros((1, 6))
         start[:, 1] = own
+        start[:, [4, 3, 5]] = motion
         start = _over_ground(start, water)
         steps = self._steps(manoeuvre.duration(self.length / own) if seconds is None else seconds)
 
@@ -323,9 +333,10 @@ def _physics(run: Run, seed: int) -> _Physics | None:
 
 
 def _over_ground(start: np.ndarray, water: Water) -> np.ndarray:
-    """An approach through the water, along x₀, as it is over ground."""
+    """An approach through the water as it is over ground."""
     found = start.copy()
-    found[:, [1, 3]] += np.array(water.current)
+    c, s = np.cos(start[:, 4]), np.sin(start[:, 4])
+    found[:, [1, 3]] += np.stack(in_body_axes(*water.current, c, s), -1)
     return found
 
 
