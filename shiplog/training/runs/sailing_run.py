@@ -43,6 +43,8 @@ class Sails(Protocol):
     @property
     def name(self) -> str: ...
     @property
+    def given(self) -> bool: ...
+    @property
     def judges_itself(self) -> bool: ...
     def training(self) -> pl.DataFrame: ...
     def band(self) -> Any: ...
@@ -105,6 +107,8 @@ class Sailor:
         self._seeds = tuple(run.config.seeds)
         self._physics = [_physics(run, seed) for seed in self._seeds]
         self.substeps = self._physics[0].substeps if self._physics[0] else 1
+        # published or estimated coefficients are those of the equations, not of Euler's steps
+        self.heun = run.given
         self._controls: dict[tuple[float, float], Controls] = {}
         self._roots: list[np.ndarray] | None = None
         self._discrepancy: Discrepancy | None = None
@@ -311,7 +315,7 @@ class Sailor:
         return sailed(many, self.rates(members, rng), process), left
 
     def _steps(self, seconds: float) -> Steps:
-        return Steps(seconds, self.row, self.substeps, self.limits)
+        return Steps(seconds, self.row, self.substeps, self.limits, heun=self.heun)
 
     def frame(
         self,
