@@ -17,14 +17,17 @@ from shiplog.exceptions import ModelError, listed
 from shiplog.nomenclature.channels import STATE, VELOCITY, WIND
 from shiplog.nomenclature.frames import in_body_axes
 from shiplog.ship_profile.profile import Profile
-from shiplog.simulation import coverage, discrepancy
+from shiplog.simulation import coverage, discrepancy, prediction_interval, rollout
 from shiplog.simulation.controls import STEERING_CAUSES, Controls, Gear, controls
 from shiplog.simulation.discrepancy import Discrepancy
 from shiplog.simulation.helm import Helm, OfTables, helm
 from shiplog.simulation.members import Rates, of_networks, of_physics
+from shiplog.simulation.prediction_interval import Band
 from shiplog.simulation.sailing import DIVERGED, STILL, Sailed, Steps, Water, sail
 from shiplog.simulation.schedules import Manoeuvre, Schedule
 from shiplog.simulation.window_series import apparent_wind, true_wind
+from shiplog.voyages.windows import windows
+from shiplog.voyages.windows.split import plan
 
 MEMBERS = 200  # of an ensemble: the ends of a 90 % interval are known to a tenth of its width
 APPROACH = 0.9  # quantile of the training data's speed, where none is given
@@ -47,6 +50,8 @@ class Sails(Protocol):
     @property
     def judges_itself(self) -> bool: ...
     def training(self) -> pl.DataFrame: ...
+    def validation(self) -> pl.DataFrame: ...
+    def models(self) -> dict[int, Any]: ...
     def band(self) -> Any: ...
     def simulator(self, seed: int) -> Any: ...
     def extended(self, seed: int) -> Any: ...
@@ -110,6 +115,7 @@ class Sailor:
         # published or estimated coefficients are those of the equations, not of Euler's steps
         self.heun = run.given
         self._controls: dict[tuple[float, float], Controls] = {}
+        self.fitted_band = False  # whether its discrepancy is of voyages that it was fitted to
         self._roots: list[np.ndarray] | None = None
         self._discrepancy: Discrepancy | None = None
         self._coverage: coverage.Coverage | None = None
@@ -177,7 +183,7 @@ class Sailor:
     @property
     def discrepancy(self) -> Discrepancy:
         if self._discrepancy is None:
-            band = self.run.band()
+            band = self.run.band() or self._own_band()
             slip = _slip(self.profile)
             none = Discrepancy(np.zeros(3), 1.0, 1.0, slip)
             if band is None:
@@ -193,6 +199,22 @@ class Sailor:
                     wind, self.row, self.substeps, self.length, slip,
                 )  # fmt: skip
         return self._discrepancy
+
+    def _own_band(self) -> Band | None:
+        """Of a run that has none, as one that a diagnosis extended: from its validation voyages,
+        else from those of its training."""
+        size, names = self.run.config.window, (self.profile.actuator_names, self.profile.wind_names)
+        for rows in (self.run.validation(), self.training):
+            if rows.is_empty() or (planned := plan(rows, "ref", size)).is_empty():
+                continue
+            cut = windows.cut(rows, planned, size, *names)
+            first = next(iter(self.run.models().values()))
+            with np.errstate(all="ignore"):
+                error = rollout.simulate(first, cut) - cut.state
+            groups = cut.plan["voyage"].n_unique()
+            self.fitted_band = rows is self.training and not self.run.given
+            return prediction_interval.calibrate(error, np.zeros_like(error), groups)
+        return None
 
     def outside(self, sailed: Sailed, member: int = 0) -> Outside:
         """Where a member left the training data."""
@@ -239,6 +261,11 @@ class Sailor:
             found.append(
                 f"It was extended by {listed(self.ignored)}, which is about what is recorded: "
                 "it does not change how the ship sails."
+            )
+        if self.fitted_band:
+            found.append(
+                "Its discrepancy is that of the voyages that it was fitted to: on others it is "
+                "larger, and so is the interval."
             )
         if not self.spreads:
             found.append(
