@@ -31,7 +31,7 @@ from shiplog.training.physics.held_out import (
 from shiplog.training.physics.model_selection import choose_network, choose_ridge, physics
 from shiplog.training.physics.output_error import Identified
 from shiplog.training.physics.setup import Prepared, prepare
-from shiplog.training.runs import load_model, plausible_model, run_folder
+from shiplog.training.runs import load_model, plausible_model, run_folder, trust_file
 from shiplog.training.runs.load_model import Run
 from shiplog.training.runs.provenance import provenance
 from shiplog.training.runs.run_folder import RunFolder
@@ -96,7 +96,7 @@ def _finish(
     result = Identification(
         done, found.errors, (*found.sentences, *questions), (*found.doubts, *questions),
         baseline_losses(windows.cut(rows, done.windows(), size, *names)),
-        (ship.words(size), ship.advice(size)),
+        (ship.words(size), ship.advice(size)), trust_file.of_run(done),
     )  # fmt: skip
     files.write_text(done.path / PAGE, inert(result.page))
     return done, result
