@@ -98,6 +98,16 @@ class FeedForward(nn.Module):
         return self.layers[-1](hidden) * scale.output_std + scale.output_mean
 
     @torch.no_grad()
+    def accelerations(
+        self, velocity: np.ndarray, actuator: np.ndarray, wind: np.ndarray
+    ) -> np.ndarray:
+        """ν̇ [N, 3] of velocities [N, 3], actuators [N, A] and apparent wind [N, 0|2], float64."""
+        driven = exogenous(
+            torch.from_numpy(actuator), torch.from_numpy(wind), self.shape.wind_input
+        )
+        return self.acceleration(torch.from_numpy(velocity), driven).numpy()
+
+    @torch.no_grad()
     def simulate(self, windows: Windows) -> np.ndarray:
         """States [N, I, 6] from the first measured ones, by explicit Euler (Eq. 9), in float64."""
         driven = driven_by(windows, self.shape.wind_input)

@@ -53,6 +53,24 @@ def _rollout(model, theta, start, actuator, wind, dt):
     return jnp.concatenate((start[:, None], jnp.moveaxis(states, 0, 1)), axis=1)
 
 
+@traced
+def _values(model, theta, state, actuator, wind):
+    """ν̇ [n, 3], sample by sample."""
+
+    def one(state, actuator, wind):
+        return model.acceleration(theta, state, actuator, wind)
+
+    return jax.vmap(one)(state, actuator, wind)
+
+
+def values(model: Physical, theta: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+    """ν̇ [n, 3] of rows (state, what drives) [n, 6 + D]; filled up as `padded` does."""
+    count = len(inputs)
+    size = max(8, 1 << (count - 1).bit_length())
+    rows = np.concatenate((inputs, np.repeat(inputs[-1:], size - count, axis=0)))
+    return np.asarray(_values(model, theta, rows[:, :6], rows[:, 6:-2], rows[:, -2:]))[:count]
+
+
 def _fine(actuator, wind, dt, substeps: int):
     """Inputs held over each step, the step cut into `substeps`."""
     held = (actuator[:, :-1], wind[:, :-1], dt / substeps)

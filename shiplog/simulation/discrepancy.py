@@ -1,0 +1,120 @@
+"""What a model gets wrong beyond the spread of its coefficients, as a random acceleration.
+
+    d' = -d/τ + s √(2/τ) w,   d(0) ~ N(0, s²)
+
+an Ornstein-Uhlenbeck process of each of u̇, v̇ and ṙ (Uhlenbeck & Ornstein 1930). Its sizes s are
+such that the rollouts of the run err as much as they did on voyages that no fit has used: the
+run's band (`prediction_interval`). A missing force stays while the motion does, so τ is long, and
+grows with the square of the speed: s is that of the training data's speed, times (U/U_training)².
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from shiplog.nomenclature.channels import VELOCITY_IN_STATE
+from shiplog.nomenclature.numbers import NINETY_SPREADS
+from shiplog.simulation.members import Rates
+from shiplog.simulation.prediction_interval import Band
+
+MEMORY = 10.0  # τ in L/V: a third of a circle, or a swing of a zigzag
+STARTS = 64  # seconds of the training data from which the response is measured
+PROBE = 0.02  # of V²/L, and V²/L² of the yaw rate: small, so that the response is linear
+
+
+@dataclass(frozen=True)
+class Discrepancy:
+    """size    [3] s, m/s² and rad/s²
+    memory  τ, s
+    speed   of the training data, root mean square, m/s"""
+
+    size: np.ndarray
+    memory: float
+    speed: float
+
+    def scale(self, state: np.ndarray) -> np.ndarray:
+        """(U/U_training)² of states [N, 6]: [N, 1]."""
+        return ((state[:, 1] ** 2 + state[:, 3] ** 2) / self.speed**2)[:, None]
+
+    def process(self, count: int, rng: np.random.Generator, wider: float = 1.0) -> Process:
+        """Of so many members, the first of which has none; `wider` times as large."""
+        return Process(self, count, rng, wider)
+
+
+class Process:
+    """d of each member [N, 3], step by step, exact for any step."""
+
+    def __init__(self, of: Discrepancy, count: int, rng: np.random.Generator, wider: float) -> None:
+        self._of, self._size, self._memory, self._rng = of, wider * of.size, of.memory, rng
+        self._now = self._size * rng.standard_normal((count, 3))
+        self._now[:1] = 0.0
+
+    def __call__(self, state: np.ndarray, step: float) -> np.ndarray:
+        found, keep = self._now, math.exp(-step / self._memory)
+        drawn = self._rng.standard_normal(found.shape)
+        drawn[:1] = 0.0
+        self._now = keep * found + math.sqrt(1.0 - keep * keep) * self._size * drawn
+        return found * self._of.scale(state)
+
+
+def calibrated(
+    rates: Rates,
+    band: Band,
+    state: np.ndarray,
+    actuator: np.ndarray,
+    wind: np.ndarray,
+    step: float,
+    substeps: int,
+    length: float,
+) -> Discrepancy:
+    """From a run's band, and how its own rollouts respond.
+
+    state, actuator, wind   [n, ...] seconds of the training data, true wind; the response is the
+                            mean over the second half of the band's length, with both held
+    step                    s between the band's samples
+
+    The variances solve G s² = e², s² ≥ 0 by least squares, each row in units of e²: G [3, 3] is the
+    variance of u, v, r that a unit of each gives, e² what the band adds to the coefficients'.
+    """
+    from scipy.optimize import nnls
+
+    speed = max(float(np.sqrt(np.mean(state[:, 1] ** 2 + state[:, 3] ** 2))), 1e-3)
+    memory = MEMORY * length / speed
+    plain = Discrepancy(np.zeros(3), memory, speed)
+    unit = PROBE * speed**2 / length * np.array([1.0, 1.0, 1.0 / length])
+    rng = np.random.default_rng(0)
+    rows = rng.choice(len(state), min(STARTS, len(state)), replace=False)
+    count, steps = len(rows), len(band.growth) - 1
+    chosen = [np.tile(part[rows], (4, 1)) for part in (state, actuator, wind)]
+    size = np.zeros((4 * count, 3))
+    for i in range(3):
+        size[(i + 1) * count : (i + 2) * count, i] = unit[i]
+    velocity = list(VELOCITY_IN_STATE)
+    now, h = chosen[0].copy(), step / substeps
+    push, keep = size * rng.standard_normal(size.shape), math.exp(-h / memory)
+    squares, taken = np.zeros((3, 3)), 0
+    with np.errstate(all="ignore"):
+        for k in range(steps * substeps):
+            rate = rates(now, chosen[1], chosen[2]) + push * plain.scale(now)
+            now[:, velocity] += h * rate
+            now[:, 4] += h * now[:, 5]
+            push = keep * push + math.sqrt(1.0 - keep * keep) * size * rng.standard_normal(
+                size.shape
+            )
+            if k >= steps * substeps // 2:
+                moved = now[:, velocity].reshape(4, count, 3)
+                apart = moved[1:] - moved[0]
+                good = np.isfinite(apart).all((0, 2))
+                squares += (apart[:, good] ** 2).mean(1).T
+                taken += 1
+    G = squares / max(taken, 1)  # [of u v r, by u v r]
+    late = band.growth[len(band.growth) // 2 :, velocity]
+    known = np.isfinite(late).all()
+    error = (late**2).mean(0) * (band.factor[velocity] / NINETY_SPREADS) ** 2
+    if not known or not np.isfinite(G).all() or not (error > 0.0).all():
+        return plain
+    found, _ = nnls(G / error[:, None], np.ones(3))
+    return Discrepancy(unit * np.sqrt(found), memory, speed)

@@ -1,0 +1,109 @@
+"""ν̇ of many members of a model at once: members differ in their state, their inputs and, where
+coefficients are drawn from their covariance, in their coefficients.
+
+Physics are run by the kernel of their kind (`kernel.rollouts.values`), JAX where none can be made.
+A model whose coefficients differ from member to member is the same equations with the coefficients
+among what drives it, so that one call serves all members.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from shiplog.machine import trees
+from shiplog.machine.arrays import Array
+from shiplog.nomenclature.channels import VELOCITY_IN_STATE
+from shiplog.simulation.kernel import rollouts
+from shiplog.simulation.window_series import apparent_wind
+
+# Rows of state, inputs and coefficients that stay in a core's cache (70 numbers of 8 bytes each)
+ROWS_AT_A_TIME = 2048
+
+# (state [N, 6], actuator [N, A], true wind [N, 2]) -> ν̇ [N, 3]
+Rates = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+
+
+@trees.tree(data=["base"], fixed=["count"])
+@dataclass(frozen=True)
+class EachItsOwn:
+    """A model whose `count` coefficients stand behind its actuators; θ is empty."""
+
+    base: Any
+    count: int
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return ()
+
+    @property
+    def substeps(self) -> int:
+        return self.base.substeps
+
+    @property
+    def smooth(self) -> float:
+        return self.base.smooth
+
+    def acceleration(self, theta: Array, state: Array, actuator: Array, true_wind: Array) -> Array:
+        """ν̇ [3] of one sample; arguments as for MMG.acceleration."""
+        at = actuator.shape[-1] - self.count
+        return self.base.acceleration(actuator[at:], state, actuator[:at], true_wind)
+
+
+def of_physics(model: Any, theta: np.ndarray, more: int = 0) -> Rates:
+    """Of equations with their coefficients θ [P], or [N, P] one row a member.
+
+    more   columns of ones behind the actuators: the share of the campaign of an extended model,
+           at its end
+    """
+    own = theta.ndim == 2
+    whole = EachItsOwn(model, theta.shape[-1]) if own else model
+    fixed = np.zeros(0) if own else theta
+    inputs = np.zeros((0, 0))
+
+    def rates(state: np.ndarray, actuator: np.ndarray, wind: np.ndarray) -> np.ndarray:
+        nonlocal inputs
+        count, driving = actuator.shape
+        if inputs.shape[0] != count:
+            last = theta if own else np.zeros((count, 0))
+            inputs = np.ones((count, 6 + driving + more + last.shape[1] + 2))
+            inputs[:, 6 + driving + more : -2] = last
+        inputs[:, :6], inputs[:, 6 : 6 + driving], inputs[:, -2:] = state, actuator, wind
+        parts = []
+        for at in range(0, count, ROWS_AT_A_TIME):
+            part = inputs[at : at + ROWS_AT_A_TIME]
+            found = rollouts.values(whole, fixed, part)
+            if found is None:
+                from shiplog.simulation import jax_rollouts
+
+                found = jax_rollouts.values(whole, fixed, part)
+            parts.append(found)
+        return np.concatenate(parts) if len(parts) != 1 else parts[0]
+
+    return rates
+
+
+class Accelerates(Protocol):
+    """A network: ν̇ [N, 3] of velocities [N, 3], actuators [N, A] and apparent wind [N, 0|2]."""
+
+    def accelerations(
+        self, velocity: np.ndarray, actuator: np.ndarray, wind: np.ndarray
+    ) -> np.ndarray: ...
+
+
+def of_networks(networks: list[Accelerates], member: np.ndarray, has_wind: bool) -> Rates:
+    """Of trained networks; `member` [N] says which one each member is."""
+
+    def rates(state: np.ndarray, actuator: np.ndarray, wind: np.ndarray) -> np.ndarray:
+        velocity = state[:, list(VELOCITY_IN_STATE)]
+        blowing = apparent_wind(state, wind) if has_wind else np.zeros((len(state), 0))
+        found = np.empty((len(state), 3))
+        for i, network in enumerate(networks):
+            rows = member == i
+            found[rows] = network.accelerations(velocity[rows], actuator[rows], blowing[rows])
+        return found
+
+    return rates

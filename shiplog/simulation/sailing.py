@@ -1,0 +1,187 @@
+"""A model sailed on orders: members of it, each with its own state, coefficients and disturbance.
+
+    ν̇ = f(x, u, ω; θ) + d,   η̇ = R(ψ) ν + c,   x₀ … in the water, which moves with c over ground
+
+By explicit Euler at the step that the model was identified with, as its rollouts are (Eq. 9). The
+wind over ground and the current are even and steady. d is each member's draw of what the model is
+known to get wrong (`discrepancy`), zero for the model as it stands.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import polars as pl
+
+from shiplog.nomenclature.channels import STATE
+from shiplog.nomenclature.frames import in_body_axes, in_earth_axes
+from shiplog.simulation.controls import Controls, Gear
+from shiplog.simulation.helm import Helm
+from shiplog.simulation.members import Rates
+
+# Times the largest speed and yaw rate of the training data beyond which a model has diverged: no
+# ship goes there, and a network that does never comes back.
+DIVERGED = 5.0
+
+# (states [N, 6], s until the next call) -> [N, 3] m/s² and rad/s²
+Disturbance = Callable[[np.ndarray, float], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Water:
+    """wind     [2] where it comes from over ground, along x₀ and y₀, m/s
+    current  [2] where it sets, along x₀ and y₀, m/s"""
+
+    wind: tuple[float, float] = (0.0, 0.0)
+    current: tuple[float, float] = (0.0, 0.0)
+
+
+STILL = Water()
+
+
+def from_direction(speed: float, degrees: float) -> tuple[float, float]:
+    """(north, east) of a speed and a direction, clockwise from x₀."""
+    angle = math.radians(degrees)
+    return speed * math.cos(angle), speed * math.sin(angle)
+
+
+@dataclass(frozen=True)
+class Sailed:
+    """N members over K instants.
+
+    time       [K]        s
+    state      [N, K, 6]  channels.STATE over ground; not a number after a member's end
+    actuator   [N, K, A]  as recorded, SI
+    ended      [N]        s at which the manoeuvre was complete; infinite where it was not
+    diverged   [N]        s at which the member left what any ship does; infinite where it did not
+    water                 wind and current
+    names                 of the actuators
+    """
+
+    time: np.ndarray
+    state: np.ndarray
+    actuator: np.ndarray
+    ended: np.ndarray
+    diverged: np.ndarray
+    water: Water
+    names: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.state)
+
+    @cached_property
+    def frame(self) -> pl.DataFrame:
+        """member, time, the state's channels and the actuators, SI, a row an instant at which the
+        member still sailed."""
+        count, instants, _ = self.state.shape
+        there = np.isfinite(self.state).all(-1).ravel()
+        columns = {
+            "member": np.repeat(np.arange(count, dtype=np.int32), instants),
+            "time": np.tile(self.time, count),
+        }
+        columns |= {c.name: self.state[..., i].ravel() for i, c in enumerate(STATE)}
+        columns |= {n: self.actuator[..., i].ravel() for i, n in enumerate(self.names)}
+        return pl.DataFrame(columns).filter(pl.Series(there))
+
+    def band(self, low: float = 0.05, high: float = 0.95) -> tuple[np.ndarray, np.ndarray]:
+        """[K, 6] between which the middle of the members is while nine in ten of them sail."""
+        there = np.isfinite(self.state).all(-1).mean(0) >= high - low
+        edges = np.full((2, *self.state.shape[1:]), np.nan)
+        if there.any():
+            edges[:, there] = np.nanquantile(self.state[:, there], (low, high), axis=0)
+        return edges[0], edges[1]
+
+
+@dataclass(frozen=True)
+class Steps:
+    """seconds   of the whole, at most
+    row       between two instants that are kept, s
+    substeps  of Euler in each
+    limits    [3] |u|, |v|, |r| at which a member has diverged
+    """
+
+    seconds: float
+    row: float
+    substeps: int
+    limits: np.ndarray
+
+
+def sail(
+    rates: Rates,
+    helm: Helm,
+    controls: Controls,
+    start: np.ndarray,
+    steps: Steps,
+    *,
+    water: Water = STILL,
+    gear: Gear | None = None,
+    disturbance: Disturbance | None = None,
+    measured: bool = False,
+) -> Sailed:
+    """Members from states [N, 6] over ground.
+
+    measured   orders are positions that were recorded: no rate of the actuators limits them
+    """
+    count, rows = len(start), max(1, math.ceil(steps.seconds / steps.row))
+    step = steps.row / steps.substeps
+    current = np.array(water.current)
+    blowing = np.tile(np.array(water.wind) + current, (count, 1))  # over the water
+    state = np.array(start, dtype=float)
+    state[:, [1, 3]] -= _across(state[:, 4], current)
+    ends, diverged = np.full(count, math.inf), np.full(count, math.inf)
+    order = helm.order(0.0, step, state)
+    acts = order.actuators if measured else np.tile(controls.approach, (count, 1))
+    states = [_over_ground(state, current)]
+    actuators = [acts]
+    with np.errstate(all="ignore"):  # a member may diverge
+        for k in range(rows * steps.substeps):
+            time = k * step
+            if measured:
+                acts = order.actuators
+            else:
+                acts = controls.moved(acts, order.actuators, order.due + step)
+            acting = acts if gear is None else gear.acting(acts, step)
+            rate = rates(state, acting, blowing)
+            if disturbance is not None:
+                rate = rate + disturbance(state, step)
+            north, east = in_earth_axes(
+                state[:, 1], state[:, 3], np.cos(state[:, 4]), np.sin(state[:, 4])
+            )
+            change = np.stack(
+                (north + current[0], rate[:, 0], east + current[1], rate[:, 1], state[:, 5],
+                 rate[:, 2]), axis=1,
+            )  # fmt: skip
+            state = state + step * change
+            lost = ~(np.abs(state[:, [1, 3, 5]]) < steps.limits).all(1)
+            diverged[lost & np.isinf(diverged)] = time + step
+            order = helm.order(time + step, step, state)
+            ends[order.done & np.isinf(ends) & ~lost] = time + step
+            if (k + 1) % steps.substeps == 0:
+                states.append(_over_ground(state, current))
+                actuators.append(acts)
+                if (np.isfinite(ends) | np.isfinite(diverged)).all():
+                    break
+    found = np.stack(states, axis=1)
+    instants = np.arange(found.shape[1]) * steps.row
+    last = np.minimum(ends + steps.row, diverged - step)
+    found[instants[None, :] > last[:, None] + 1e-9] = np.nan
+    return Sailed(
+        instants, found, np.stack(actuators, axis=1), ends, diverged, water, controls.names
+    )
+
+
+def _across(heading: np.ndarray, current: np.ndarray) -> np.ndarray:
+    """The current [N, 2] ahead and to starboard of each heading."""
+    return np.stack(in_body_axes(current[0], current[1], np.cos(heading), np.sin(heading)), -1)
+
+
+def _over_ground(state: np.ndarray, current: np.ndarray) -> np.ndarray:
+    if not current.any():
+        return state
+    found = state.copy()
+    found[:, [1, 3]] += _across(state[:, 4], current)
+    return found

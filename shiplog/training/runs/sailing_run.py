@@ -1,0 +1,411 @@
+"""A run's model sailed on orders: as it stands, and as an ensemble of what it may be as well.
+
+The first member is the model as it stands (of a network its first seed). The others are its seeds,
+or draws of its coefficients, each with a draw of the discrepancy that held-out voyages have shown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import polars as pl
+
+from shiplog.exceptions import ModelError, listed
+from shiplog.nomenclature.channels import STATE, VELOCITY, WIND
+from shiplog.nomenclature.frames import in_body_axes
+from shiplog.simulation import coverage, discrepancy
+from shiplog.simulation.controls import STEERING_CAUSES, Controls, Gear, controls
+from shiplog.simulation.discrepancy import Discrepancy
+from shiplog.simulation.helm import Helm, OfTables, helm
+from shiplog.simulation.members import Rates, of_networks, of_physics
+from shiplog.simulation.sailing import DIVERGED, STILL, Sailed, Steps, Water, sail
+from shiplog.simulation.schedules import Manoeuvre, Schedule
+from shiplog.simulation.window_series import apparent_wind, true_wind
+
+if TYPE_CHECKING:
+    from shiplog.training.runs.load_model import Run
+
+MEMBERS = 200  # of an ensemble: the ends of a 90 % interval are known to a tenth of its width
+APPROACH = 0.9  # quantile of the training data's speed, where none is given
+FARTHEST = 10.0  # times that the discrepancy is widened outside the training data, at most
+STATES = tuple(c.name for c in STATE)
+
+
+@dataclass(frozen=True)
+class Outside:
+    """Where a simulation left the run's training data.
+
+    share      of its seconds
+    distance   mean over them, in limits of the coverage; 1 where all are inside
+    channels   name → share of the seconds in which that channel is beyond what was recorded
+    """
+
+    share: float
+    distance: float
+    channels: Mapping[str, float]
+
+    @property
+    def anywhere(self) -> bool:
+        return self.share >= coverage.OUTSIDE
+
+    @property
+    def sentence(self) -> str:
+        """Empty where it is inside."""
+        if not self.anywhere:
+            return ""
+        where = [
+            f"{name.replace('_', ' ')} ({share:.0%})"
+            for name, share in sorted(self.channels.items(), key=lambda one: -one[1])
+            if share >= coverage.OUTSIDE
+        ]
+        named = f": {', '.join(where)}" if where else ""
+        return f"outside the training data in {self.share:.0%} of the seconds{named}"
+
+
+class Sailor:
+    """What is worked out once of a run, and serves all its manoeuvres."""
+
+    def __init__(self, run: Run) -> None:
+        self.run, self.profile = run, run.profile
+        self.training = run.training()
+        self.length = run.profile.ship.length_m
+        if self.training.is_empty():
+            raise ModelError(
+                f"{run.path} has no training rows, which show how far its actuators go.",
+                hint="train the run again.",
+            )
+        time = self.training["time"].to_physical().to_numpy() * 1e-9
+        gaps = np.diff(time)
+        self.row = float(np.median(gaps[gaps > 0.0])) if (gaps > 0.0).any() else 1.0
+        self.speed = float(self.training["surge"].quantile(APPROACH) or 0.0)
+        seen = self.training.select(c.name for c in VELOCITY).to_numpy()
+        most = np.abs(seen).max(0)
+        # a small sway or yaw rate in the training data is no limit of the ship
+        scale = np.array([most[0], most[0], most[0] / self.length])
+        self.limits = DIVERGED * np.maximum(most, scale)
+        self._seeds = tuple(run.config.seeds)
+        self._physics = [_physics(run, seed) for seed in self._seeds]
+        self.substeps = self._physics[0].substeps if self._physics[0] else 1
+        self._controls: dict[tuple[float, float], Controls] = {}
+        self._discrepancy: Discrepancy | None = None
+        self._coverage: coverage.Coverage | None = None
+
+    # --- parts ---
+
+    def rates(self, count: int, rng: np.random.Generator | None = None) -> Rates:
+        """ν̇ of so many members: the model as it stands, or, with `rng`, all but the first drawn."""
+        first = self._physics[0]
+        if first is None:
+            networks = self._networks()
+            member = np.arange(count) % len(networks) if rng is not None else np.zeros(count, int)
+            return of_networks(networks, member, self.profile.has_wind)
+        if rng is None:
+            return of_physics(first.model, first.theta, first.more)
+        return of_physics(first.model, self._drawn(count, rng), first.more)
+
+    def _drawn(self, count: int, rng: np.random.Generator) -> np.ndarray:
+        """θ [N, P] of seeds in turn, from N(θ, Σ) but for the first."""
+        found = np.empty((count, len(self._physics[0].theta)))
+        for i, one in enumerate(self._physics):
+            values, vectors = np.linalg.eigh(one.covariance)
+            root = vectors * np.sqrt(np.maximum(values, 0.0))
+            rows = np.arange(i, count, len(self._physics))
+            found[rows] = one.theta + rng.standard_normal((len(rows), len(one.theta))) @ root.T
+        found[:1] = self._physics[0].theta
+        return found
+
+    def _networks(self) -> list[Any]:
+        if not hasattr(self, "_opened"):
+            self._opened = [self.run.simulator(seed) for seed in self._seeds]
+        return self._opened
+
+    @property
+    def spreads(self) -> bool:
+        """Whether its members differ: seeds, uncertain coefficients, or a known discrepancy."""
+        own = self._physics[0]
+        known = len(self._seeds) > 1 or (own is not None and bool(np.any(own.covariance)))
+        return known or bool(self.discrepancy.size.any())
+
+    @property
+    def causes(self) -> tuple[Any, ...]:
+        held = self.run.extension
+        return () if held is None else held.causes
+
+    @property
+    def ignored(self) -> tuple[str, ...]:
+        """Causes of an extended run that are about what is recorded, not about how it sails."""
+        return tuple(c.label for c in self.causes if c.reads and c.name not in STEERING_CAUSES)
+
+    def gear(self) -> Gear | None:
+        held = self.run.extension
+        if held is None:
+            return None
+        return Gear(held.causes, held.numbers, self.profile)
+
+    def controls(self, speed: float, rudder_rate: float = 0.0) -> Controls:
+        key = (speed, rudder_rate)
+        if key not in self._controls:
+            self._controls[key] = controls(
+                self.profile, self.training, self.rates(1), speed, rudder_rate
+            )
+        return self._controls[key]
+
+    @property
+    def discrepancy(self) -> Discrepancy:
+        if self._discrepancy is None:
+            band = self.run.band()
+            none = Discrepancy(np.zeros(3), 1.0, 1.0)
+            if band is None:
+                self._discrepancy = none
+            else:
+                state = self.training.select(STATES).to_numpy()
+                actuator = self.training.select(self.profile.actuator_names).to_numpy()
+                wind = np.zeros((len(state), 2))
+                if self.profile.has_wind:
+                    wind = true_wind(state, self.training.select(c.name for c in WIND).to_numpy())
+                self._discrepancy = discrepancy.calibrated(
+                    self.rates(4 * min(discrepancy.STARTS, len(state))), band, state, actuator,
+                    wind, self.row, self.substeps, self.length,
+                )  # fmt: skip
+        return self._discrepancy
+
+    def outside(self, sailed: Sailed, member: int = 0) -> Outside:
+        """Where a member left the training data."""
+        if self._coverage is None:
+            self._coverage = coverage.learn(
+                self.training, self.profile.actuator_names, self.profile.has_wind
+            )
+        keep = np.isfinite(sailed.state[member]).all(-1)
+        state, actuator = sailed.state[member][keep], sailed.actuator[member][keep]
+        columns = {c.name: state[:, i] for i, c in enumerate(STATE)}
+        columns |= {n: actuator[:, i] for i, n in enumerate(sailed.names)}
+        if self.profile.has_wind:
+            blowing = apparent_wind(state, np.tile(sailed.water.wind, (len(state), 1)))
+            columns |= {c.name: blowing[:, i] for i, c in enumerate(WIND)}
+        rows = pl.DataFrame(columns)
+        if rows.is_empty():
+            return Outside(1.0, FARTHEST, {})
+        distance = self._coverage.distance(rows)
+        marked = self._coverage.mark_outside(rows)
+        return Outside(
+            share=float((distance > 1.0).mean()),
+            distance=float(np.maximum(distance, 1.0).mean()),
+            channels={name: float(mask.mean()) for name, mask in marked.items()},
+        )
+
+    # --- sailing ---
+
+    def sail(
+        self,
+        manoeuvre: Manoeuvre,
+        *,
+        speed: float | None = None,
+        water: Water = STILL,
+        members: int = MEMBERS,
+        seed: int = 0,
+        rudder_rate: float = 0.0,
+        seconds: float | None = None,
+        approach: np.ndarray | None = None,
+        motion: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    ) -> tuple[Sailed, Outside]:
+        """A manoeuvre from a straight approach, and where the model as it stands left the training
+        data in it. The first of the members is the model as it stands. Raises ModelError.
+
+        approach   [A] of the actuators, SI, instead of those at which the model keeps the speed
+        motion     heading, sway and yaw rate at the order, SI
+        """
+        own = self.speed if speed is None else speed
+        if not own > 0.0:
+            raise ModelError(
+                f"A manoeuvre begins ahead, and {own:g} m/s is not.",
+                hint="give --speed the approach speed in m/s.",
+            )
+        sticks = self.controls(own, rudder_rate)
+        if approach is not None:
+            sticks = replace(sticks, approach=np.where(sticks.steering != 0.0, 0.0, approach))
+        if not isinstance(manoeuvre, Schedule) and not sticks.steers and manoeuvre.kind != "stop":
+            raise ModelError(
+                f"{self.profile.ship.name} has neither a rudder nor an azimuth astern, and "
+                f"a {manoeuvre.kind.replace('_', '-')} is sailed with one.",
+                hint="give --schedule a file with the orders of its actuators.",
+            )
+        refuse_unknown(manoeuvre, self.profile.actuator_names)
+        start = np.zeros((1, 6))
+        start[:, 1] = own
+        start[:, [4, 3, 5]] = motion
+        start = _over_ground(start, water)
+        steps = self._steps(manoeuvre.duration(self.length / own) if seconds is None else seconds)
+
+        def sailed(first: np.ndarray, rates: Rates, more: Any) -> Sailed:
+            made = helm(manoeuvre, sticks, first, self.length / own)
+            return sail(rates, made, sticks, first, steps, water=water, gear=self.gear(),
+                        disturbance=more)  # fmt: skip
+
+        alone = sailed(start, self.rates(1), None)
+        left = self.outside(alone)
+        if members < 2 or not self.spreads:
+            return alone, left
+        rng = np.random.default_rng(seed)
+        wider = min(left.distance, FARTHEST) if left.anywhere else 1.0
+        many = np.repeat(start, members, axis=0)
+        process = self.discrepancy.process(members, rng, wider)
+        return sailed(many, self.rates(members, rng), process), left
+
+    def _steps(self, seconds: float) -> Steps:
+        return Steps(seconds, self.row, self.substeps, self.limits)
+
+    def frame(
+        self,
+        inputs: pl.DataFrame | Manoeuvre,
+        start: pl.DataFrame | Mapping[str, float] | None,
+        *,
+        water: Water = STILL,
+        spread: bool = False,
+        seed: int = 0,
+        seconds: float | None = None,
+    ) -> Sailed:
+        """As many members as `start` has rows or `inputs` has members; see `Run.simulate`."""
+        first = _starts(start, self.speed)
+        tables = None
+        if isinstance(inputs, pl.DataFrame):
+            tables = _tables(inputs, self.profile.actuator_names)
+            seconds = tables[0][-1] if seconds is None else seconds
+            if len(tables[1]) != len(first) and 1 not in (len(tables[1]), len(first)):
+                raise ModelError(
+                    f"`inputs` has {len(tables[1])} members and `start` {len(first)} rows.",
+                    hint="give one of them, or as many of both.",
+                )
+            first = np.repeat(first, len(tables[1]), axis=0) if len(first) == 1 else first
+        else:
+            refuse_unknown(inputs, self.profile.actuator_names)
+        speed = float(np.median(first[:, 1]))
+        own = speed if speed > 0.0 else max(self.speed, 1e-3)
+        sticks = self.controls(own)
+        length_time = self.length / own
+        made: Helm
+        if tables is not None:
+            made = OfTables(*tables, sticks, first, length_time)
+        else:
+            made = helm(inputs, sticks, first, length_time)
+            seconds = inputs.duration(length_time) if seconds is None else seconds
+        rng = np.random.default_rng(seed) if spread else None
+        process = None if rng is None else self.discrepancy.process(len(first), rng)
+        return sail(
+            self.rates(len(first), rng), made, sticks, first, self._steps(float(seconds)),
+            water=water, gear=self.gear(), disturbance=process, measured=tables is not None,
+        )  # fmt: skip
+
+
+def refuse_unknown(manoeuvre: Manoeuvre, names: tuple[str, ...]) -> None:
+    """Raises ModelError for a schedule of actuators that the ship has not."""
+    other = set(manoeuvre.orders) - set(names) if isinstance(manoeuvre, Schedule) else ()
+    if other:
+        raise ModelError(
+            f"The schedule {manoeuvre.name} orders {listed(other)}, which the ship has not.",
+            hint=f"its actuators are {listed(names)}.",
+        )
+
+
+@dataclass(frozen=True)
+class _Physics:
+    model: Any
+    theta: np.ndarray
+    covariance: np.ndarray
+    more: int
+
+    @property
+    def substeps(self) -> int:
+        return self.model.substeps
+
+
+def _physics(run: Run, seed: int) -> _Physics | None:
+    """Equations of a seed; None of a plain network, which is asked as it is."""
+    if run.extension is not None:
+        found = run.extended(seed)
+        return _Physics(found.model, found.theta, found.covariance, 1)
+    if run.judges_itself:
+        own = run.simulator(seed)
+        return _Physics(own.model, own.theta, own.covariance, 0)
+    return None
+
+
+def _over_ground(start: np.ndarray, water: Water) -> np.ndarray:
+    """An approach through the water as it is over ground."""
+    found = start.copy()
+    c, s = np.cos(start[:, 4]), np.sin(start[:, 4])
+    found[:, [1, 3]] += np.stack(in_body_axes(*water.current, c, s), -1)
+    return found
+
+
+def _starts(start: pl.DataFrame | Mapping[str, float] | None, speed: float) -> np.ndarray:
+    """States [N, 6] over ground; what is left out is zero, and the surge the run's usual one."""
+    rows = pl.DataFrame({} if start is None else start) if not isinstance(start, pl.DataFrame) \
+        else start  # fmt: skip
+    other = set(rows.columns) - set(STATES) - {"member"}
+    if other:
+        raise ModelError(
+            f"`start` has {listed(other)}, which is no part of a ship's state.",
+            hint=f"its columns are {listed(STATES)}, SI.",
+        )
+    count = max(rows.height, 1)
+    found = np.zeros((count, 6))
+    found[:, 1] = speed
+    for i, name in enumerate(STATES):
+        if name in rows.columns:
+            found[:, i] = rows[name].cast(pl.Float64).to_numpy()
+    if not np.isfinite(found).all():
+        raise ModelError("`start` has a state that is not finite.", hint="give numbers, SI.")
+    return found
+
+
+def _tables(inputs: pl.DataFrame, names: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Times [K] and actuators [N, K, A] of rows (member), time, actuators."""
+    lacking = [n for n in ("time", *names) if n not in inputs.columns]
+    if lacking:
+        raise ModelError(
+            f"`inputs` lacks {listed(lacking)}.",
+            hint=f"its columns are time [s] and {listed(names)}, SI; `member` where they differ.",
+        )
+    count = inputs["member"].n_unique() if "member" in inputs.columns else 1
+    ordered = inputs.sort("member", "time") if count > 1 else inputs.sort("time")
+    values = ordered.select("time", *names).cast(pl.Float64).to_numpy()
+    if not len(values) or len(values) % count or not np.isfinite(values).all():
+        raise ModelError(
+            "`inputs` has no rows, members of other lengths, or values that are not finite.",
+            hint="give every member the same times, and every row numbers, SI.",
+        )
+    values = values.reshape(count, -1, 1 + len(names))
+    time = values[0, :, 0]
+    if (values[..., 0] != time).any() or (np.diff(time) <= 0.0).any() or time[0] < 0.0:
+        raise ModelError(
+            "The times of `inputs` do not rise, or differ from member to member.",
+            hint="give every member the same times, in seconds from zero on.",
+        )
+    return time, values[..., 1:]
+
+
+def of_run(run: Run) -> Sailor:
+    """Raises RunError or ModelError where the run cannot be sailed."""
+    return Sailor(run)
+
+
+def without_water(sailor: Sailor) -> Sailor:
+    """The same without a current that an extension has: a standard manoeuvre is in still water."""
+    held = sailor.run.extension
+    if held is None or "current" not in {c.name for c in held.causes}:
+        return sailor
+    numbers = {
+        c.label: np.zeros_like(held.numbers[c.label]) if c.name == "current"
+        else held.numbers[c.label]
+        for c in held.causes
+    }  # fmt: skip
+    covariance = {
+        c.label: np.zeros_like(held.covariance[c.label]) if c.name == "current"
+        else held.covariance[c.label]
+        for c in held.causes
+    }  # fmt: skip
+    return Sailor(replace(sailor.run, extension=replace(held, numbers=numbers,
+                                                       covariance=covariance)))  # fmt: skip
