@@ -25,12 +25,14 @@ MOST_ALIASES = 4  # sentences on combinations; the table has all
 INPUTS = {"wind_ahead": "wind from ahead", "wind_athwart": "wind from starboard"}
 
 
-def coefficient_lines(run: str, judged: Sequence[CoefficientTrust]) -> list[str]:
+def coefficient_lines(
+    run: str, judged: Sequence[CoefficientTrust], by: str = "by its training voyages"
+) -> list[str]:
     """How many coefficients have each verdict, which, and what combinations are told apart."""
     if not judged:
         return []
     of = {verdict: [one for one in judged if one.verdict == verdict] for verdict in VERDICTS}
-    lines = [f"Coefficients of {run}, by its training voyages: {counts(judged)}."]
+    lines = [f"Coefficients of {run}, {by}: {counts(judged)}."]
     for verdict in (TRUSTED, COMBINED, UNMEASURED):
         if of[verdict]:
             names = listed([one.name for one in of[verdict]], most=MOST_NAMED)

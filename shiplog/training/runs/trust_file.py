@@ -20,6 +20,7 @@ from shiplog.voyages.windows import windows
 log = logging.getLogger(__name__)
 
 FILE = "trust.json"
+SHEET = "trial_sheet.toml"  # of a run from a trial sheet, which has no voyage to judge by
 
 
 def of_run(run: Run) -> tuple[CoefficientTrust, ...]:
@@ -34,6 +35,8 @@ def of_run(run: Run) -> tuple[CoefficientTrust, ...]:
     path = run.path / FILE
     if path.is_file():
         return _read(run)
+    if (run.path / SHEET).is_file():
+        return ()
     judged = judge(run)
     try:
         save(run, judged)
