@@ -48,7 +48,7 @@ SHORT_TURN, LONG_TURN = math.radians(190.0), math.radians(560.0)
 REVERSALS = {"second_overshoot": 3, "third_overshoot": 4, "period": 4}  # of the rudder; else 2
 CONDITIONS = ("speed", "revolutions", "wind", "rudder_rate")
 MOST_BYTES = 1_000_000  # of a sheet, which has a page of numbers
-HELP = "the manual's page on train has an example"
+HELP = "the manual's page on trial sheets has an example"
 
 
 class SheetError(ShiplogError):
