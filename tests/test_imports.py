@@ -22,6 +22,7 @@ ROWS = {
     "simulation": "rollouts, derivatives, errors, baselines",
     "training": "recipes, identification, run folders",
     "diagnosis": "segments, hypotheses, posterior, refutation",
+    "manoeuvres": "recognition, quantities, criteria",
     "report": "verdict, pages, tables, viewer",
     "commands": "what each command does, and its answer",
     "cli": "arguments and printing",
@@ -36,6 +37,7 @@ ROOMS = {
     "diagnosis": ("linear", "noise", "nominal", "trial", "hypotheses", "verdict", "residual"),
     "report": (
         "evaluation", "figures", "viewer", "diagnosis", "paper", "page", "gate", "fleet",
+        "manoeuvres",
     ),
 }  # fmt: skip
 LEVEL = {name: level for level, name in enumerate(ROWS)}

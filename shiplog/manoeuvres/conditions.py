@@ -62,9 +62,7 @@ class Conditions:
         }  # fmt: skip
 
 
-def of(
-    found: Found, record: Record, profile: Profile, coverage: float | None = None
-) -> Conditions:
+def of(found: Found, record: Record, profile: Profile, coverage: float | None = None) -> Conditions:
     speed = found.approach.speed if found.approach else found.track.at(
         found.track.speed, found.begin
     )  # fmt: skip
@@ -117,7 +115,7 @@ def _approach(found: Found, usual: float) -> list[str]:
     if before is None:
         return ["the record does not show its approach"]
     reasons = []
-    if not before.steady and not (found.kind in ("pull_out", "spiral")):
+    if not before.steady and found.kind not in ("pull_out", "spiral"):
         turning = abs(before.yaw) * 180.0 / math.pi
         reasons.append(
             f"the approach is not steady: the heading changes by {turning:.0f} deg in a length, "

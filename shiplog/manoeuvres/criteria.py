@@ -19,7 +19,9 @@ TRACK_REACH, TRACK_REACH_MOST = 15.0, 20.0  # L; the Administration may go to 20
 SHORT, LONG = 10.0, 30.0  # s of L/V
 FULL_RUDDER = math.radians(35.0)  # or the maximum that is permissible at the test speed
 NEAR = math.radians(1.0)  # how far off the standard's angles an order may be
-SHIPS = f"ships of {LEAST_LENGTH:.0f} m and over, and chemical tankers and gas carriers of any length"
+SHIPS = (
+    f"ships of {LEAST_LENGTH:.0f} m and over, and chemical tankers and gas carriers of any length"
+)
 
 
 def first_overshoot(length_time: float) -> float:

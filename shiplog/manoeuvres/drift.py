@@ -54,16 +54,18 @@ def of_turn(track: Track, begin: float, side: float) -> Drift | None:
             break
     else:
         return None
-    found = []
-    for angle in np.arange(after, turned - CIRCLE, EVERY):
-        early = track.reaches(first + side * angle, side, begin)
-        late = track.reaches(first + side * (angle + CIRCLE), side, begin)
-        if early is None or late is None:
-            break
-        found.append((track.place_at(late) - track.place_at(early)) / (late - early))
-    if len(found) < 2:
+    late = track.time >= begin
+    # the heading rises to its side all the time, but for its noise
+    heading = np.maximum.accumulate(side * (track.heading[late] - first))
+    angles = np.arange(after, turned - CIRCLE, EVERY)
+    early, later = (np.interp(at, heading, track.time[late]) for at in (angles, angles + CIRCLE))
+    gone = np.stack(
+        [np.interp(later, track.time, x) - np.interp(early, track.time, x) for x in track.place.T],
+        axis=-1,
+    )
+    pairs = gone / (later - early)[:, None]
+    if len(pairs) < 2:
         return None
-    pairs = np.array(found)
     independent = max(1.0, (len(pairs) - 1) * EVERY / INDEPENDENT)
     covariance = np.cov(pairs.T) / independent
     return Drift(pairs.mean(0), covariance, after)

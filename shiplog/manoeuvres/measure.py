@@ -23,9 +23,6 @@ from shiplog.nomenclature.numbers import NINETY_SPREADS
 from shiplog.ship_profile.profile import Profile
 
 DRAWS = 40  # their standard deviation is known to a ninth
-# Of the wind's speed: what a ship drifts in it that lies stopped. Loaded tankers have 2 to 4 %,
-# ships in ballast up to 6. A drift that is no more may be the wind's alone.
-LEEWAY = 0.06
 # Accuracy where the profile states none: a satellite receiver's, a compass's
 PLACE_SIGMA, HEADING_SIGMA = 1.0, math.radians(0.5)
 SMALLEST_SHARE = 0.02  # of L: a receiver's noise is not more than that on a ship it is meant for
@@ -34,13 +31,15 @@ SMALLEST_SHARE = 0.02  # of L: a receiver's noise is not more than that on a shi
 @dataclass(frozen=True)
 class Measured:
     """quantities  name → estimate
-    drift       from positions 360 degrees apart; None where there are none
-    corrected   whether it was taken out, as a current
+    drift       from positions 360 degrees apart, which was taken out; None where there are none
     """
 
     quantities: Mapping[str, Estimate]
     drift: Drift | None = None
-    corrected: bool = False
+
+    @property
+    def corrected(self) -> bool:
+        return self.drift is not None
 
 
 def values(found: Found, track: Track) -> dict[str, float]:
@@ -68,27 +67,23 @@ def values(found: Found, track: Track) -> dict[str, float]:
     return {}
 
 
-def measured(found: Found, profile: Profile, wind: float | None, step: float) -> Measured:
-    """Of a recorded manoeuvre. `wind`: mean true wind, m/s; `step`: s between two rows."""
+def measured(found: Found, profile: Profile, step: float) -> Measured:
+    """Of a recorded manoeuvre. `step`: s between two rows."""
     moved = drift.of_turn(found.track, found.begin, found.side) if found.kind == "turn" else None
-    taken = moved is not None and moved.speed > LEEWAY * (wind or 0.0)
-    track = found.track.without(moved.velocity) if taken and moved else found.track
+    track = found.track.without(moved.velocity) if moved else found.track
     best = values(found, track)
     if not best:
-        return Measured({}, moved, taken)
+        return Measured({}, moved)
     noise = _noise(profile, track.length)
     rng = np.random.default_rng(0)
-    drawn = [
-        values(*_disturbed(found, noise, moved if taken else None, step, rng))
-        for _ in range(DRAWS)
-    ]
+    drawn = [values(*_disturbed(found, noise, moved, step, rng)) for _ in range(DRAWS)]
     estimates = {}
     for name, value in best.items():
         many = np.array([one[name] for one in drawn if name in one])
         spread = float(many.std(ddof=1)) if len(many) > DRAWS // 2 else 0.0
         half = NINETY_SPREADS * spread
         estimates[name] = Estimate(value, value - half, value + half)
-    return Measured(estimates, moved, taken)
+    return Measured(estimates, moved)
 
 
 def _noise(profile: Profile, length: float) -> tuple[float, float]:

@@ -231,7 +231,11 @@ def _zigzag(
     at = np.array([track.heading_at(t) for t in orders])
     if not straight and len(at) < 4:
         return None  # few orders out of a turn are steering
-    if len(at) < 3 and before is not None and not (before.steady and abs(before.gained) < MOST_GAIN):
+    if (
+        len(at) < 3
+        and before is not None
+        and not (before.steady and abs(before.gained) < MOST_GAIN)
+    ):
         return None  # so are two that follow others
     first = at[0] if straight else 0.5 * (at[1] + at[2])
     sides = side * (-1.0) ** np.arange(len(at) - 1)
@@ -264,9 +268,7 @@ def _swing_end(track: Track, end: float, held: Sequence[Hold], chain: list[int])
 # --- turns -----------------------------------------------------------------------------------
 
 
-def _turn(
-    voyage: str, track: Track, held: Sequence[Hold], at: int, usual: float
-) -> Found | None:
+def _turn(voyage: str, track: Track, held: Sequence[Hold], at: int, usual: float) -> Found | None:
     hold, length_time = held[at], track.length / usual
     side = math.copysign(1.0, hold.angle)
     begin = _order(track, held, at, length_time)
@@ -285,7 +287,9 @@ def _turn(
     elif turned < math.radians(480.0):
         part = f"{degrees:.0f} deg: no two positions are 360 deg apart, and the current is unknown"
     if before is None or not before.straight:
-        part = "it begins out of another turn, and has neither advance nor diameter" + (f"; {part}" if part else "")
+        part = "it begins out of another turn, and has neither advance nor diameter" + (
+            f"; {part}" if part else ""
+        )
     return Found(
         voyage, "turn", begin, hold.end, side, abs(hold.angle), 0.0, (begin,),
         _cut(track, begin, hold.end), before, part,
@@ -367,13 +371,17 @@ def _stops(voyage: str, track: Track, usual: float) -> list[Found]:
             continue
         ahead = np.flatnonzero(~off[k + 1 :])
         last = k + int(ahead[0]) if len(ahead) else len(track) - 1
-        slow = np.flatnonzero(track.state[k:last + 1, 1] <= 0.0)
+        slow = np.flatnonzero(track.state[k : last + 1, 1] <= 0.0)
         whole = bool(len(slow))
         last = k + int(slow[0]) if whole else last
         if last <= k + 1 or (not whole and track.state[last, 1] > LOST * speed):
             continue
         reversed_ = bool((driven[k : last + 1] < -STOPPED_SCREW).any())
-        part = "" if whole else f"it is not stopped: {track.state[last, 1] / speed:.0%} of its speed remain"  # noqa: E501
+        part = (
+            ""
+            if whole
+            else f"it is not stopped: {track.state[last, 1] / speed:.0%} of its speed remain"
+        )
         if not reversed_:
             part = "the propeller is stopped, and never astern" + (f"; {part}" if part else "")
         end = float(track.time[min(last + 1, len(track) - 1)])

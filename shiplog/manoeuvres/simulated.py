@@ -89,7 +89,9 @@ def measure(
         case PullOut():
             return _of_pull_out(track, manoeuvre)
         case Spiral():
-            return steadiness.loop([(a, steadiness.settled(track, end)) for a, end in _steps(track)])
+            return steadiness.loop(
+                [(a, steadiness.settled(track, end)) for a, end in _steps(track)]
+            )
     return {}
 
 
@@ -190,10 +192,18 @@ def beside(
         wind = (float(north), float(east))
     seconds = LONGER * (found.end - found.begin)
     driven = record.actuator[during] if during.any() else record.actuator[:1]
-    approach = None if found.kind == "stop" else np.median(driven, axis=0)
+    approach = np.median(driven, axis=0)
+    positions = None
+    if found.kind == "stop" and during.any():  # an engine's orders are its own: as recorded
+        positions = record.time[during] - found.begin, driven
+        if len(driven) < 2 or positions[0][-1] <= 0.0:
+            return None
+        last = np.append(positions[0], max(seconds, positions[0][-1] + 1.0))
+        positions = last, np.concatenate((driven, driven[-1:]))
     sailed, outside = sailor.sail(
         manoeuvre, speed=own, water=Water(wind=wind), members=members, seconds=seconds,
         approach=approach, motion=(float(state[4]), float(state[3]), float(state[5])),
+        positions=positions,
     )  # fmt: skip
     note = OUTSIDE_NOTE if outside.anywhere else ""
     quantities = intervals(sailed, manoeuvre, sailor.profile, note, corrected)

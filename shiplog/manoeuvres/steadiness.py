@@ -9,6 +9,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -58,7 +59,7 @@ def loop(steps: Sequence[tuple[float, float]]) -> dict[str, float]:
 
 
 def _zero(way: Sequence[tuple[float, float]]) -> float | None:
-    for (a, ra), (b, rb) in zip(way[:-1], way[1:], strict=True):
+    for (a, ra), (b, rb) in itertools.pairwise(way):
         if ra == 0.0:
             return a
         if (ra > 0.0) != (rb > 0.0):

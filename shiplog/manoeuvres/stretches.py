@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -49,7 +50,7 @@ def tracks(record: Record) -> list[Track]:
         Track(
             record.time[a:b], record.state[a:b], rudder[a:b], screw[a:b], profile.ship.length_m
         )
-        for a, b in zip(edges[:-1], edges[1:], strict=True)
+        for a, b in itertools.pairwise(edges)
         if b - a >= LEAST_ROWS
     ]  # fmt: skip
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from shiplog.nomenclature.frames import in_body_axes, in_earth_axes
 
+MOST_STEPS = 60  # of a bisection: to the last bit
 PEAK_ROOTS = 1e-12  # of a quadratic's leading coefficient, below which it is a line
 
 
@@ -127,14 +128,27 @@ class Track:
         k = int(rows[0])
         if k == 0:
             return float(self.time[0])
-        low, high = max(self.time[k - 1], after), self.time[k]
-        for _ in range(60):  # bisection: to the last bit, wherever the cubic bends
-            middle = 0.5 * (low + high)
-            if side * (self.heading_at(middle) - heading) >= 0.0:
-                high = middle
-            else:
-                low = middle
-        return float(high)
+        return self._crossing(k - 1, heading, max(float(self.time[k - 1]), after))
+
+    def _crossing(self, k: int, heading: float, after: float) -> float:
+        """Of the cubic between samples k and k + 1: Newton's steps, halved where they leave it."""
+        h = float(self.time[k + 1] - self.time[k])
+        y0, y1 = float(self.heading[k]) - heading, float(self.heading[k + 1]) - heading
+        m0, m1 = h * float(self.yaw_rate[k]), h * float(self.yaw_rate[k + 1])
+        c3, c2 = 2.0 * (y0 - y1) + m0 + m1, 3.0 * (y1 - y0) - 2.0 * m0 - m1
+        low, high = min(max((after - float(self.time[k])) / h, 0.0), 1.0), 1.0
+        sign = 1.0 if y1 >= 0.0 and y1 >= y0 else -1.0
+        s = min(max(y0 / (y0 - y1), low), high) if y0 != y1 else high
+        for _ in range(MOST_STEPS):
+            value = ((c3 * s + c2) * s + m0) * s + y0
+            low, high = (low, s) if sign * value >= 0.0 else (s, high)
+            slope = (3.0 * c3 * s + 2.0 * c2) * s + m0
+            after_ = s - value / slope if slope else low - 1.0
+            new = after_ if low <= after_ <= high else 0.5 * (low + high)
+            if abs(new - s) < 1e-14:
+                break
+            s = new
+        return float(self.time[k]) + h * s
 
     def peak(self, side: float, begin: float, end: float) -> tuple[float, float] | None:
         """Time and heading of the extreme to that side within [begin, end]; None where the heading

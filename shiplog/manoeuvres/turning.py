@@ -46,9 +46,7 @@ def quantities(track: Track, begin: float, side: float) -> dict[str, float]:
     return found | steady(track, first, side, begin, speed)
 
 
-def steady(
-    track: Track, first: float, side: float, begin: float, speed: float
-) -> dict[str, float]:
+def steady(track: Track, first: float, side: float, begin: float, speed: float) -> dict[str, float]:
     """Of the part beyond STEADY_AFTER, averaged over whole circles where there is one."""
     turned = side * (track.heading - first)
     late = (turned >= STEADY_AFTER) & (track.time > begin)

@@ -1,10 +1,10 @@
 """Quantities of a zigzag A/B (IMO MSC/Circ.1053, 3.2; ITTC 7.5-04-02-01).
 
-    overshoot k        |ψ| at its k-th peak, minus |ψ| at which the rudder was ordered back for the
-                       k-th time
-    time to check yaw  from the first order back to the first peak
-    period             between the first and the third peak: one whole swing
-    initial turning    along the track from the first order to |ψ - ψ₀| = 10°, with 10° of rudder
+overshoot k        |ψ| at its k-th peak, minus |ψ| at which the rudder was ordered back for the
+                   k-th time
+time to check yaw  from the first order back to the first peak
+period             between the first and the third peak: one whole swing
+initial turning    along the track from the first order to |ψ - ψ₀| = 10°, with 10° of rudder
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ INITIAL_RUDDER = math.radians(1.0)  # how far off 10 deg the rudder may be for i
 ORDINALS = ("first", "second", "third")
 
 
-def quantities(track: Track, orders: Sequence[float], side: float, angle: float) -> dict[str, float]:
+def quantities(
+    track: Track, orders: Sequence[float], side: float, angle: float
+) -> dict[str, float]:
     """Of orders at these instants: the first one over to that side, then each one back [s].
 
     angle   of the rudder, rad

@@ -5,13 +5,17 @@
 an Ornstein-Uhlenbeck process of each of u̇, v̇ and ṙ (Uhlenbeck & Ornstein 1930). Its sizes s are
 such that the rollouts of the run err as much as they did on voyages that no fit has used: the
 run's band (`prediction_interval`). A missing force stays while the motion does, so τ is long, and
-grows with the square of the speed: s is that of the training data's speed, times (U/U_training)².
+grows with the dynamic pressure at hull and rudder: s is that of the training data, times
+
+    q/q_training,   q = U² + ½ (n D)²
+
+of the mean revolutions n and diameter D of its screws, whose slipstream the rudders stand in.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +25,7 @@ from shiplog.simulation.members import Rates
 from shiplog.simulation.prediction_interval import Band
 
 MEMORY = 10.0  # τ in L/V: a third of a circle, or a swing of a zigzag
+SLIPSTREAM = 0.5  # of (n D)²: the mean of the slipstream's speed squared behind a loaded screw
 STARTS = 64  # seconds of the training data from which the response is measured
 PROBE = 0.02  # of V²/L, and V²/L² of the yaw rate: small, so that the response is linear
 
@@ -29,19 +34,26 @@ PROBE = 0.02  # of V²/L, and V²/L² of the yaw rate: small, so that the respon
 class Discrepancy:
     """size    [3] s, m/s² and rad/s²
     memory  τ, s
-    speed   of the training data, root mean square, m/s"""
+    pressure  q of the training data, mean, m²/s²
+    slip      [A] D of what is a screw, divided by their number; zero of other actuators"""
 
     size: np.ndarray
     memory: float
-    speed: float
+    pressure: float
+    slip: np.ndarray
 
-    def scale(self, state: np.ndarray) -> np.ndarray:
-        """(U/U_training)² of states [N, 6]: [N, 1]."""
-        return ((state[:, 1] ** 2 + state[:, 3] ** 2) / self.speed**2)[:, None]
+    def scale(self, state: np.ndarray, actuator: np.ndarray) -> np.ndarray:
+        """q/q_training of states [N, 6] and actuators [N, A]: [N, 1]."""
+        return (pressure(state, actuator, self.slip) / self.pressure)[:, None]
 
     def process(self, count: int, rng: np.random.Generator, wider: float = 1.0) -> Process:
         """Of so many members, the first of which has none; `wider` times as large."""
         return Process(self, count, rng, wider)
+
+
+def pressure(state: np.ndarray, actuator: np.ndarray, slip: np.ndarray) -> np.ndarray:
+    """q [N] of states [N, 6] and actuators [N, A]."""
+    return state[:, 1] ** 2 + state[:, 3] ** 2 + SLIPSTREAM * (actuator @ slip) ** 2
 
 
 class Process:
@@ -52,12 +64,12 @@ class Process:
         self._now = self._size * rng.standard_normal((count, 3))
         self._now[:1] = 0.0
 
-    def __call__(self, state: np.ndarray, step: float) -> np.ndarray:
+    def __call__(self, state: np.ndarray, actuator: np.ndarray, step: float) -> np.ndarray:
         found, keep = self._now, math.exp(-step / self._memory)
         drawn = self._rng.standard_normal(found.shape)
         drawn[:1] = 0.0
         self._now = keep * found + math.sqrt(1.0 - keep * keep) * self._size * drawn
-        return found * self._of.scale(state)
+        return found * self._of.scale(state, actuator)
 
 
 def calibrated(
@@ -69,6 +81,7 @@ def calibrated(
     step: float,
     substeps: int,
     length: float,
+    slip: np.ndarray,
 ) -> Discrepancy:
     """From a run's band, and how its own rollouts respond.
 
@@ -83,7 +96,8 @@ def calibrated(
 
     speed = max(float(np.sqrt(np.mean(state[:, 1] ** 2 + state[:, 3] ** 2))), 1e-3)
     memory = MEMORY * length / speed
-    plain = Discrepancy(np.zeros(3), memory, speed)
+    mean = float(pressure(state, actuator, slip).mean())
+    plain = Discrepancy(np.zeros(3), memory, max(mean, 1e-9), slip)
     unit = PROBE * speed**2 / length * np.array([1.0, 1.0, 1.0 / length])
     rng = np.random.default_rng(0)
     rows = rng.choice(len(state), min(STARTS, len(state)), replace=False)
@@ -98,7 +112,7 @@ def calibrated(
     squares, taken = np.zeros((3, 3)), 0
     with np.errstate(all="ignore"):
         for k in range(steps * substeps):
-            rate = rates(now, chosen[1], chosen[2]) + push * plain.scale(now)
+            rate = rates(now, chosen[1], chosen[2]) + push * plain.scale(now, chosen[1])
             now[:, velocity] += h * rate
             now[:, 4] += h * now[:, 5]
             push = keep * push + math.sqrt(1.0 - keep * keep) * size * rng.standard_normal(
@@ -117,4 +131,4 @@ def calibrated(
     if not known or not np.isfinite(G).all() or not (error > 0.0).all():
         return plain
     found, _ = nnls(G / error[:, None], np.ones(3))
-    return Discrepancy(unit * np.sqrt(found), memory, speed)
+    return replace(plain, size=unit * np.sqrt(found))

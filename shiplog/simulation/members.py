@@ -63,27 +63,30 @@ def of_physics(model: Any, theta: np.ndarray, more: int = 0) -> Rates:
     whole = EachItsOwn(model, theta.shape[-1]) if own else model
     fixed = np.zeros(0) if own else theta
     inputs = np.zeros((0, 0))
+    of: Callable[[np.ndarray], np.ndarray] | None = None
 
     def rates(state: np.ndarray, actuator: np.ndarray, wind: np.ndarray) -> np.ndarray:
-        nonlocal inputs
+        nonlocal inputs, of
         count, driving = actuator.shape
         if inputs.shape[0] != count:
             last = theta if own else np.zeros((count, 0))
             inputs = np.ones((count, 6 + driving + more + last.shape[1] + 2))
             inputs[:, 6 + driving + more : -2] = last
+            of = of or rollouts.valuer(whole, fixed, inputs.shape[1] - 6) or _by_jax(whole, fixed)
         inputs[:, :6], inputs[:, 6 : 6 + driving], inputs[:, -2:] = state, actuator, wind
-        parts = []
-        for at in range(0, count, ROWS_AT_A_TIME):
-            part = inputs[at : at + ROWS_AT_A_TIME]
-            found = rollouts.values(whole, fixed, part)
-            if found is None:
-                from shiplog.simulation import jax_rollouts
-
-                found = jax_rollouts.values(whole, fixed, part)
-            parts.append(found)
-        return np.concatenate(parts) if len(parts) != 1 else parts[0]
+        assert of is not None
+        if count <= ROWS_AT_A_TIME:
+            return of(inputs)
+        parts = range(0, count, ROWS_AT_A_TIME)
+        return np.concatenate([of(inputs[at : at + ROWS_AT_A_TIME]) for at in parts])
 
     return rates
+
+
+def _by_jax(model: Any, theta: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    from shiplog.simulation import jax_rollouts
+
+    return lambda rows: jax_rollouts.values(model, theta, rows)
 
 
 class Accelerates(Protocol):

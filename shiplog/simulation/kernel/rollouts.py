@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -43,14 +43,26 @@ def _of(model: Any, purpose: Purpose, theta: np.ndarray, driven: int) -> Kernel 
 
 def values(model: Any, theta: np.ndarray, inputs: np.ndarray) -> np.ndarray | None:
     """ν̇ [n, 3] of rows (state, what drives) [n, 6 + D]."""
-    kernel = _of(model, PATHS, theta, inputs.shape[1] - STATES)
+    of = valuer(model, theta, inputs.shape[1] - STATES)
+    return None if of is None else of(inputs)
+
+
+def valuer(model: Any, theta: np.ndarray, driven: int) -> Callable[[np.ndarray], np.ndarray] | None:
+    """`values` of one model with its coefficients, for many calls: what depends on them alone is
+    worked out once."""
+    kernel = _of(model, PATHS, theta, driven)
     if kernel is None:
         return None
-    inputs, found = contiguous(inputs), np.empty((len(inputs), 3))
-    c = kernel.prepared(model, theta)
-    if len(inputs):
-        kernel.functions["values"](pointer(c), pointer(inputs), pointer(found), len(inputs))
-    return found
+    c, run = kernel.prepared(model, theta), kernel.functions["values"]
+
+    def of(inputs: np.ndarray) -> np.ndarray:
+        rows = contiguous(inputs, len(inputs), STATES + driven)
+        found = np.empty((len(rows), 3))
+        if len(rows):
+            run(pointer(c), pointer(rows), pointer(found), len(rows))
+        return found
+
+    return of
 
 
 def rollout(model: Any, theta: np.ndarray, data: WindowSeries) -> np.ndarray | None:

@@ -22,8 +22,10 @@ from shiplog.models.starting_values import Start
 from shiplog.nomenclature.contract import CONTRACT
 from shiplog.simulation import force_breakdown, prediction_interval
 from shiplog.simulation.extended_simulator import ExtendedSimulator, Extension, campaign
+from shiplog.simulation.sailing import STILL, Water
+from shiplog.simulation.schedules import Manoeuvre
 from shiplog.simulation.sensitivities import Simulator
-from shiplog.training.runs import coefficients, extension_file, run_folder
+from shiplog.training.runs import coefficients, extension_file, run_folder, sailing_run
 from shiplog.training.runs.coefficients import Coefficient
 from shiplog.training.runs.run_folder import RunFolder
 from shiplog.training.settings import run_files
@@ -113,6 +115,33 @@ class Run(RunFolder, ABC):
         with causes in it."""
         one = self.simulator if self.extension is None else self.extended
         return {seed: one(seed) for seed in self.config.seeds}
+
+    def simulate(
+        self,
+        inputs: pl.DataFrame | Manoeuvre,
+        start: pl.DataFrame | Mapping[str, float] | None = None,
+        *,
+        water: Water = STILL,
+        spread: bool = False,
+        seed: int = 0,
+        seconds: float | None = None,
+    ) -> pl.DataFrame:
+        """The model sailed on inputs: member, time, the state's channels and the actuators, SI.
+
+        inputs    time [s], a column an actuator [SI], and `member` where members differ; or a
+                  manoeuvre of `shiplog.simulation.schedules`
+        start     a row a member of the state's channels, over ground; what is left out is zero,
+                  and the surge the run's usual speed
+        water     wind and current
+        spread    members beyond the first are drawn as the model may be as well
+        seconds   as long as the inputs unless given
+
+        All members are sailed at once: ten thousand in a call. Raises ModelError.
+        """
+        sailor = sailing_run.of_run(self)
+        return sailor.frame(
+            inputs, start, water=water, spread=spread, seed=seed, seconds=seconds
+        ).frame
 
     def extended(self, seed: int, record: Record | None = None) -> ExtendedSimulator:
         """The run's model, with its extension if it has one, ready to absorb causes.

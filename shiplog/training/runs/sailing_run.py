@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 import polars as pl
@@ -16,6 +16,7 @@ import polars as pl
 from shiplog.exceptions import ModelError, listed
 from shiplog.nomenclature.channels import STATE, VELOCITY, WIND
 from shiplog.nomenclature.frames import in_body_axes
+from shiplog.ship_profile.profile import Profile
 from shiplog.simulation import coverage, discrepancy
 from shiplog.simulation.controls import STEERING_CAUSES, Controls, Gear, controls
 from shiplog.simulation.discrepancy import Discrepancy
@@ -25,13 +26,28 @@ from shiplog.simulation.sailing import DIVERGED, STILL, Sailed, Steps, Water, sa
 from shiplog.simulation.schedules import Manoeuvre, Schedule
 from shiplog.simulation.window_series import apparent_wind, true_wind
 
-if TYPE_CHECKING:
-    from shiplog.training.runs.load_model import Run
-
 MEMBERS = 200  # of an ensemble: the ends of a 90 % interval are known to a tenth of its width
 APPROACH = 0.9  # quantile of the training data's speed, where none is given
 FARTHEST = 10.0  # times that the discrepancy is widened outside the training data, at most
 STATES = tuple(c.name for c in STATE)
+
+
+class Sails(Protocol):
+    """What is asked of a run: `load_model.Run`, which imports this module."""
+
+    path: Any
+    config: Any
+    profile: Profile
+    extension: Any
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def judges_itself(self) -> bool: ...
+    def training(self) -> pl.DataFrame: ...
+    def band(self) -> Any: ...
+    def simulator(self, seed: int) -> Any: ...
+    def extended(self, seed: int) -> Any: ...
 
 
 @dataclass(frozen=True)
@@ -68,7 +84,7 @@ class Outside:
 class Sailor:
     """What is worked out once of a run, and serves all its manoeuvres."""
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: Sails) -> None:
         self.run, self.profile = run, run.profile
         self.training = run.training()
         self.length = run.profile.ship.length_m
@@ -90,6 +106,7 @@ class Sailor:
         self._physics = [_physics(run, seed) for seed in self._seeds]
         self.substeps = self._physics[0].substeps if self._physics[0] else 1
         self._controls: dict[tuple[float, float], Controls] = {}
+        self._roots: list[np.ndarray] | None = None
         self._discrepancy: Discrepancy | None = None
         self._coverage: coverage.Coverage | None = None
 
@@ -109,9 +126,9 @@ class Sailor:
     def _drawn(self, count: int, rng: np.random.Generator) -> np.ndarray:
         """θ [N, P] of seeds in turn, from N(θ, Σ) but for the first."""
         found = np.empty((count, len(self._physics[0].theta)))
-        for i, one in enumerate(self._physics):
-            values, vectors = np.linalg.eigh(one.covariance)
-            root = vectors * np.sqrt(np.maximum(values, 0.0))
+        if self._roots is None:
+            self._roots = [_root(one.covariance) for one in self._physics]
+        for i, (one, root) in enumerate(zip(self._physics, self._roots, strict=True)):
             rows = np.arange(i, count, len(self._physics))
             found[rows] = one.theta + rng.standard_normal((len(rows), len(one.theta))) @ root.T
         found[:1] = self._physics[0].theta
@@ -157,7 +174,8 @@ class Sailor:
     def discrepancy(self) -> Discrepancy:
         if self._discrepancy is None:
             band = self.run.band()
-            none = Discrepancy(np.zeros(3), 1.0, 1.0)
+            slip = _slip(self.profile)
+            none = Discrepancy(np.zeros(3), 1.0, 1.0, slip)
             if band is None:
                 self._discrepancy = none
             else:
@@ -168,16 +186,12 @@ class Sailor:
                     wind = true_wind(state, self.training.select(c.name for c in WIND).to_numpy())
                 self._discrepancy = discrepancy.calibrated(
                     self.rates(4 * min(discrepancy.STARTS, len(state))), band, state, actuator,
-                    wind, self.row, self.substeps, self.length,
+                    wind, self.row, self.substeps, self.length, slip,
                 )  # fmt: skip
         return self._discrepancy
 
     def outside(self, sailed: Sailed, member: int = 0) -> Outside:
         """Where a member left the training data."""
-        if self._coverage is None:
-            self._coverage = coverage.learn(
-                self.training, self.profile.actuator_names, self.profile.has_wind
-            )
         keep = np.isfinite(sailed.state[member]).all(-1)
         state, actuator = sailed.state[member][keep], sailed.actuator[member][keep]
         columns = {c.name: state[:, i] for i, c in enumerate(STATE)}
@@ -185,7 +199,14 @@ class Sailor:
         if self.profile.has_wind:
             blowing = apparent_wind(state, np.tile(sailed.water.wind, (len(state), 1)))
             columns |= {c.name: blowing[:, i] for i, c in enumerate(WIND)}
-        rows = pl.DataFrame(columns)
+        return self.outside_rows(pl.DataFrame(columns))
+
+    def outside_rows(self, rows: pl.DataFrame) -> Outside:
+        """The same of rows with the ship's columns."""
+        if self._coverage is None:
+            self._coverage = coverage.learn(
+                self.training, self.profile.actuator_names, self.profile.has_wind
+            )
         if rows.is_empty():
             return Outside(1.0, FARTHEST, {})
         distance = self._coverage.distance(rows)
@@ -195,6 +216,31 @@ class Sailor:
             distance=float(np.maximum(distance, 1.0).mean()),
             channels={name: float(mask.mean()) for name, mask in marked.items()},
         )
+
+    def notes(self, manoeuvre: Manoeuvre, speed: float | None = None) -> tuple[str, ...]:
+        """What is to be known of a simulation, in sentences."""
+        own = self.speed if speed is None else speed
+        found = []
+        if speed is None:
+            found.append(f"The approach is at {own:.3g} m/s, the usual speed of its training data.")
+        sticks = self.controls(own)
+        if not sticks.balanced and not isinstance(manoeuvre, Schedule):
+            found.append(
+                f"No revolutions of its training data keep {own:.3g} m/s: it begins with the "
+                "nearest, and its speed changes."
+            )
+        if manoeuvre.kind == "stop" and not sticks.astern.any():
+            found.append("Nothing turns astern in its training data and limits: the ship coasts.")
+        if self.ignored:
+            found.append(
+                f"It was extended by {listed(self.ignored)}, which is about what is recorded: "
+                "it does not change how the ship sails."
+            )
+        if not self.spreads:
+            found.append(
+                "It has neither an uncertainty of its numbers nor held-out voyages: no interval."
+            )
+        return tuple(found)
 
     # --- sailing ---
 
@@ -210,12 +256,14 @@ class Sailor:
         seconds: float | None = None,
         approach: np.ndarray | None = None,
         motion: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        positions: tuple[np.ndarray, np.ndarray] | None = None,
     ) -> tuple[Sailed, Outside]:
         """A manoeuvre from a straight approach, and where the model as it stands left the training
         data in it. The first of the members is the model as it stands. Raises ModelError.
 
         approach   [A] of the actuators, SI, instead of those at which the model keeps the speed
         motion     heading, sway and yaw rate at the order, SI
+        positions  times [K] and actuators [K, A] that were recorded in it
         """
         own = self.speed if speed is None else speed
         if not own > 0.0:
@@ -223,7 +271,9 @@ class Sailor:
                 f"A manoeuvre begins ahead, and {own:g} m/s is not.",
                 hint="give --speed the approach speed in m/s.",
             )
-        sticks = self.controls(own, rudder_rate)
+        # a speed to the hundredth: revolutions that a record has replace what it would take
+        at = own if approach is None else round(own, 2) or own
+        sticks = self.controls(at, rudder_rate)
         if approach is not None:
             sticks = replace(sticks, approach=np.where(sticks.steering != 0.0, 0.0, approach))
         if not isinstance(manoeuvre, Schedule) and not sticks.steers and manoeuvre.kind != "stop":
@@ -240,9 +290,15 @@ class Sailor:
         steps = self._steps(manoeuvre.duration(self.length / own) if seconds is None else seconds)
 
         def sailed(first: np.ndarray, rates: Rates, more: Any) -> Sailed:
-            made = helm(manoeuvre, sticks, first, self.length / own)
-            return sail(rates, made, sticks, first, steps, water=water, gear=self.gear(),
-                        disturbance=more)  # fmt: skip
+            given = (sticks, first, self.length / own)
+            recorded = positions is not None
+            made = OfTables(positions[0], positions[1][None], *given) if recorded else helm(
+                manoeuvre, *given
+            )  # fmt: skip
+            return sail(
+                rates, made, sticks, first, steps, water=water, gear=self.gear(), disturbance=more,
+                measured=recorded,
+            )  # fmt: skip
 
         alone = sailed(start, self.rates(1), None)
         left = self.outside(alone)
@@ -299,6 +355,20 @@ class Sailor:
         )  # fmt: skip
 
 
+def _root(covariance: np.ndarray) -> np.ndarray:
+    """R of R Rᵀ = Σ, also of a singular one."""
+    values, vectors = np.linalg.eigh(covariance)
+    return vectors * np.sqrt(np.maximum(values, 0.0))
+
+
+def _slip(profile: Profile) -> np.ndarray:
+    """[A] for `Discrepancy.slip`."""
+    found = np.array([
+        a.diameter_m or 0.0 if a.kind == "propeller" else 0.0 for a in profile.actuators
+    ])  # fmt: skip
+    return found / max(int((found > 0.0).sum()), 1)
+
+
 def refuse_unknown(manoeuvre: Manoeuvre, names: tuple[str, ...]) -> None:
     """Raises ModelError for a schedule of actuators that the ship has not."""
     other = set(manoeuvre.orders) - set(names) if isinstance(manoeuvre, Schedule) else ()
@@ -321,7 +391,7 @@ class _Physics:
         return self.model.substeps
 
 
-def _physics(run: Run, seed: int) -> _Physics | None:
+def _physics(run: Sails, seed: int) -> _Physics | None:
     """Equations of a seed; None of a plain network, which is asked as it is."""
     if run.extension is not None:
         found = run.extended(seed)
@@ -387,7 +457,7 @@ def _tables(inputs: pl.DataFrame, names: tuple[str, ...]) -> tuple[np.ndarray, n
     return time, values[..., 1:]
 
 
-def of_run(run: Run) -> Sailor:
+def of_run(run: Sails) -> Sailor:
     """Raises RunError or ModelError where the run cannot be sailed."""
     return Sailor(run)
 
