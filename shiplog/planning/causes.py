@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
@@ -126,7 +127,7 @@ def recorded(sailed: Sequence[Sailed], nominal: Record) -> Record:
         for name, values in (("voyage", np.full(len(fine), i)), ("time", fine), ("state", there),
                              ("actuator", acts), ("wind", felt)):  # fmt: skip
             parts[name].append(values)
-    joined = {name: np.concatenate(values) for name, values in parts.items()}
+    joined: dict[str, Any] = {name: np.concatenate(values) for name, values in parts.items()}
     count = len(joined["time"])
     return Record(
         profile=nominal.profile, names=tuple(f"planned_{i}" for i in range(len(sailed))),
@@ -227,4 +228,3 @@ def _sensor(
         if nats > most:
             best, most = words, nats
     return best, most
-

@@ -10,6 +10,7 @@ from shiplog.exceptions import ShiplogError, listed
 from shiplog.ship_profile.profile import Profile
 from shiplog.training.runs.sailing_run import Sailor
 
+ORDERS = 14  # of a helmsman in a manoeuvre, each at a whole second
 MANOEUVRE_TIMES = 42.0  # L/U that a manoeuvre takes unless given: 300 s of a three-metre ship
 HARD = np.radians(35.0)  # a rudder is laid so far, or as far as in the training voyages
 LEAST_TIMES = 4.0  # L/U: a shorter manoeuvre says nothing
@@ -40,7 +41,7 @@ class Limits:
     def excess(self, state: np.ndarray, length: float) -> np.ndarray:
         """[N] by how much members [N, K, 6] go beyond: lengths of the ship, and shares of the
         greatest speed; zero where they stay within. A path that ends is beyond by far."""
-        known = np.isfinite(state).all((1, 2))
+        known = np.asarray(np.isfinite(state).all((1, 2)))
         s = np.where(known[:, None, None], state, 0.0)
         out = np.maximum(np.abs(s[..., 0]).max(1) - self.ahead, 0.0) / length
         out += np.maximum(np.abs(s[..., 2]).max(1) - self.aside, 0.0) / length
@@ -89,6 +90,7 @@ def limits(
             f"{sailor.length:g} m.",
             hint="give --water more room, or sail a smaller ship.",
         )
+    time = ORDERS * max(round(time / ORDERS), 1)
     low, high = _actuators(profile, training.select(profile.actuator_names).to_numpy(), rudder)
     return Limits(float(time), between, ahead, aside, low, high)
 

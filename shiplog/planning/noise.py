@@ -18,8 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 import polars as pl
 
-from shiplog.nomenclature.channels import VELOCITY_IN_STATE
+from shiplog.nomenclature.channels import STATE, VELOCITY_IN_STATE
 from shiplog.simulation.rollout import simulate
+from shiplog.simulation.window_series import true_wind
 from shiplog.training.runs.load_model import Run
 from shiplog.voyages.windows import windows
 
@@ -51,14 +52,21 @@ def of_run(run: Run) -> Noise:
     process, velocity = np.empty(3), np.empty(3)
     for j in range(3):
         process[j], velocity[j] = _variances(np.split(errors[:, j], apart))
-    place = profile.sensors.noise("position") or min(
-        PLACE, PLACE_SHARE * profile.ship.length_m
-    )
+    place = profile.sensors.noise("position") or min(PLACE, PLACE_SHARE * profile.ship.length_m)
     heading = profile.sensors.noise("heading") or HEADING
-    sensors = np.array(
-        [place**2, velocity[0], place**2, velocity[1], heading**2, velocity[2]]
-    )
+    sensors = np.array([place**2, velocity[0], place**2, velocity[1], heading**2, velocity[2]])
     return Noise(process / step, sensors)
+
+
+def usual_wind(run: Run) -> tuple[float, float]:
+    """Mean true wind of the training voyages, where it comes from along x₀ and y₀, m/s: what a
+    manoeuvre is planned in, unless another wind is expected."""
+    if not run.profile.has_wind:
+        return 0.0, 0.0
+    rows = run.training()
+    state = rows.select(c.name for c in STATE).to_numpy()
+    north, east = true_wind(state, rows.select(run.profile.wind_names).to_numpy()).mean(0)
+    return float(north), float(east)
 
 
 def _variances(parts: Sequence[np.ndarray]) -> tuple[float, float]:

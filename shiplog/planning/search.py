@@ -8,6 +8,7 @@ each scaled to the limits. A manoeuvre that leaves them counts for less than any
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,13 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from shiplog.planning.information import Instrument, worth
-from shiplog.planning.limits import Limits, NoRoom
+from shiplog.planning.limits import ORDERS, Limits, NoRoom
 from shiplog.simulation.helm import OfTables
 from shiplog.simulation.sailing import STILL, Sailed, Steps, Water, sail
 from shiplog.simulation.schedules import HOLD, Schedule
 from shiplog.training.runs.sailing_run import Sailor
 
-ORDERS = 14  # K: a helmsman's orders in a manoeuvre
 MEMBERS = 32  # drawn in a round
 ELITE = 6  # of them, that make the next round
 ROUNDS = 160
@@ -94,10 +94,13 @@ class Search:
                 "No manoeuvre was found that stays within the limits.",
                 hint="give --water more room, --speed a wider range, or --seconds less.",
             )
-        orders = self._orders(best[None])
-        return Found(
-            orders[0], self.limits.seconds / ORDERS, best_worth, self._sail(orders), rounds
-        )
+        orders = self._readable(self._orders(best[None]))
+        if (
+            self.limits.excess((sailed := self._sail(orders)).state, self.sailor.length) > 0.0
+        ).any():
+            orders = self._orders(best[None])  # rounded, it would not stay within
+            sailed = self._sail(orders)
+        return Found(orders[0], self.limits.seconds / ORDERS, self.worth(sailed, 0), sailed, rounds)
 
     def values(self, drawn: np.ndarray) -> np.ndarray:
         """Worth [N] of manoeuvres [N, K, A] in half ranges of the actuators."""
@@ -129,6 +132,15 @@ class Search:
         low, high = self.limits.low, self.limits.high
         return 0.5 * (low + high) + 0.5 * (high - low) * drawn
 
+    def _readable(self, orders: np.ndarray) -> np.ndarray:
+        """Orders [N, K, A] as a helmsman has them: angles in whole degrees, all else in fiftieths
+        of its range."""
+        steers = np.array([a.kind in ("rudder", "azimuth") for a in self.sailor.profile.actuators])
+        wide = self.limits.high - self.limits.low
+        step = np.where(steers, math.radians(1.0), np.where(wide > 0.0, wide / 50.0, 1.0))
+        rounded = np.round(orders / step) * step
+        return np.clip(rounded, self.limits.low, self.limits.high)
+
     def _sail(self, orders: np.ndarray) -> Sailed:
         """From a straight approach at the usual speed; orders [N, K, A] SI are held, and the
         actuators follow as fast as they do."""
@@ -139,9 +151,7 @@ class Search:
         hold = self.limits.seconds / orders.shape[1]
         time = np.repeat(np.arange(orders.shape[1] + 1) * hold, 2)[1:-1]
         time[2::2] += 1e-6 * hold  # a step, by two instants that are all but one
-        made = OfTables(
-            time, np.repeat(orders, 2, axis=1), sticks, start, own.length / own.speed
-        )
+        made = OfTables(time, np.repeat(orders, 2, axis=1), sticks, start, own.length / own.speed)
         steps = Steps(self.limits.seconds, own.row, own.substeps, own.limits)
         return sail(own.rates(1), made, sticks, start, steps, water=self.water, gear=own.gear())
 
@@ -154,7 +164,7 @@ class Search:
             (np.where(k % 2, -1.0, 1.0), np.ones(ORDERS)),  # doublets
             (np.where((k // 2) % 2, -1.0, 1.0), np.ones(ORDERS)),  # a zigzag
             (np.where(k < ORDERS // 2, 1.0, -1.0), np.ones(ORDERS)),  # a turn to either side
-            (np.where(k % 4 == 1, 1.0, np.where(k % 4 == 3, -1.0, 0.0)), np.where(k % 5 == 4, -1, 1)),
+            (np.select([k % 4 == 1, k % 4 == 3], [1.0, -1.0]), np.where(k % 5 == 4, -1, 1)),  # both
             (np.where(k % 3 == 1, 1.0, -0.3), np.linspace(1.0, -0.2, ORDERS)),  # slower and slower
         ]  # fmt: skip
         found = []
