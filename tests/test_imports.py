@@ -23,6 +23,7 @@ ROWS = {
     "training": "recipes, identification, run folders",
     "diagnosis": "segments, hypotheses, posterior, refutation",
     "manoeuvres": "recognition, quantities, criteria",
+    "planning": "what to sail next, and what it would show",
     "report": "verdict, pages, tables, viewer",
     "commands": "what each command does, and its answer",
     "cli": "arguments and printing",

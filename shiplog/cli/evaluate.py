@@ -22,9 +22,13 @@ from shiplog.cli.output import LOST, answer, leave_lost
 
 
 def evaluate(
-    run: Annotated[
-        Path,
-        typer.Argument(help="A trained run, such as runs/ref.", autocompletion=completion.runs),
+    runs: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="RUN...",
+            help="A trained run, such as runs/ref; of several, also which is better.",
+            autocompletion=completion.runs,
+        ),
     ],
     voyages: TestVoyages = None,
     store: StoreOption = STORE,
@@ -34,11 +38,13 @@ def evaluate(
 ) -> None:
     """How far off a model is on measured voyages.
 
-    L, RMSE per channel, errors at the end of a window, and coverage, next to two baselines.
+    L, RMSE per channel, errors at the end of a window, and coverage, next to two baselines; which
+    coefficients may be trusted, and whether the residuals are noise. Of several runs, the
+    probability that one is better than another on new voyages.
 
     Example: shiplog evaluate runs/ref --voyages voyage_6
     """
-    check_runs([run], store, voyages, cause)
+    check_runs(runs, store, voyages, cause)
     page = page_file(report)
     from shiplog.commands.bars import loading
 
@@ -46,7 +52,7 @@ def evaluate(
         from shiplog.commands.evaluate import evaluate_runs, keep_pages, save
     from shiplog.voyages.store.store import Store
 
-    found = evaluate_runs([run], Store(store), voyages or [], cause or [])
+    found = evaluate_runs(runs, Store(store), voyages or [], cause or [])
     answer(found, json_to)
     leave_lost([*save(found), *keep_pages(found, Store(store), page)])
     if set(found.too_short) & set(voyages or ()):  # by its own name, and the answer says so

@@ -23,7 +23,7 @@ from shiplog.cli.options import (
 )
 from shiplog.cli.output import answer
 from shiplog.exceptions import UsageError, listed
-from shiplog.models import FORCES, MODELS
+from shiplog.models import FORCES, MODELS, PHYSICS
 from shiplog.nomenclature.channels import AUTO_WINDOW
 from shiplog.voyages.windows.augmentation import AUGMENTATIONS
 
@@ -105,10 +105,24 @@ Again = Annotated[
     ),
 ]
 
+TrialSheet = Annotated[
+    Path | None,
+    typer.Option(
+        help="Physical models: TOML of a trial sheet's numbers, from which alone it is identified.",
+    ),
+]
+SheetProfile = Annotated[
+    str | None,
+    typer.Option("--profile", help="With --trial-sheet: the ship's profile, a name or a path."),
+]
+
 NO_MODEL = (
     "No --model is given: this trains {model}, the paper's network. To begin with a ship, take "
     "--model mmg: it needs fewer voyages, and its coefficients have a meaning."
 )
+OF_SHEET = (  # those that go with --trial-sheet
+    "out", "trial_sheet", "profile", "model", "parameters", "without", "free", "json_to",
+)  # fmt: skip
 OF_AGAIN = ("out", "again", "store", "json_to")  # parameters that go with --again
 
 
@@ -133,6 +147,8 @@ def train(
     folds: Folds = None,
     unchecked: Unchecked = False,
     again: Again = None,
+    trial_sheet: TrialSheet = None,
+    profile: SheetProfile = None,
     store: StoreOption = STORE,
     json_to: JsonOption = None,
 ) -> None:
@@ -145,6 +161,8 @@ def train(
     Example: shiplog train --model mmg --voyages 'june_*' --out runs/mmg
 
     Example: shiplog train --again runs/mmg --out runs/mmg-2
+
+    Example: shiplog train --model mmg --trial-sheet trials.toml --out runs/trials
     """
     from shiplog.machine.paths import check_run, check_writable, refuse_run
     from shiplog.training.settings.options import TrainOptions
@@ -167,6 +185,20 @@ def train(
         found = again_command(store, out, again)
         answer(found, json_to)
         return
+    if trial_sheet is not None:
+        _refuse_of_voyages(context, model)
+        from shiplog.commands.bars import loading
+
+        with loading():
+            from shiplog.commands.identify_sheet import sheet_command
+        answer(sheet_command(trial_sheet, profile, out, options), json_to)
+        return
+    if profile is not None:
+        raise UsageError(
+            "--profile goes with --trial-sheet: voyages have the profile that they were ingested "
+            "with.",
+            hint="leave it out.",
+        )
     check_voyages(store, voyages, validation)
     if not _typed(context, "model"):
         typer.echo(NO_MODEL.format(model=model), err=True)
@@ -191,6 +223,28 @@ def _refuse_others(context: typer.Context) -> None:
             f"--again repeats a run as it was, and {listed(f'--{name}' for name in given)} would "
             "change it.",
             hint="leave the other options out, or train a run of other settings without --again.",
+        )
+
+
+def _refuse_of_voyages(context: typer.Context, model: str) -> None:
+    """Raises UsageError for a model, or an option, that a trial sheet is too little for."""
+    if MODELS[model].family is not PHYSICS or MODELS[model].residual:
+        fitting = [name for name, kind in MODELS.items() if kind.family is PHYSICS
+                   and not kind.residual]  # fmt: skip
+        raise UsageError(
+            f"A trial sheet has too few numbers for a {model}.",
+            hint=f"add --model {' or '.join(fitting)}.",
+        )
+    given = [
+        "no-fit" if (name, value) == ("fit", False) else name.replace("_", "-")
+        for name, value in context.params.items()
+        if name not in OF_SHEET and _typed(context, name)
+    ]
+    if given:
+        raise UsageError(
+            f"A trial sheet has no voyages, and {listed(f'--{name}' for name in given)} is about "
+            "these.",
+            hint="leave it out; the sheet has the conditions of its manoeuvres.",
         )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from shiplog.exceptions import ShiplogError
 from shiplog.machine.paths import refuse_same_names
 from shiplog.machine.unexpected import unexpected
 from shiplog.models.causes import user
-from shiplog.nomenclature.channels import STATE
+from shiplog.nomenclature.channels import STATE, VELOCITY_IN_STATE
 from shiplog.report.evaluation.evaluation import Evaluation
 from shiplog.report.figures.plots import Plots
 from shiplog.report.page import html
@@ -26,7 +27,10 @@ from shiplog.report.viewer.comparison_data import (
 )
 from shiplog.simulation import baselines, prediction_interval, scoring
 from shiplog.simulation import coverage as covering
-from shiplog.training.runs import load_model
+from shiplog.simulation.better_model import Better, better
+from shiplog.simulation.residual_tests import ResidualTest, residual_tests
+from shiplog.simulation.rollout import simulate
+from shiplog.training.runs import load_model, trust_file
 from shiplog.training.runs.load_model import Run
 from shiplog.training.runs.run_checks import (
     refuse_no_window,
@@ -44,7 +48,7 @@ from shiplog.voyages.windows.windows import Windows
 WINDOWS_SHOWN = 2.0  # windows about a moment: one before it and one after
 
 # seconds of the sample logs' test voyage
-STAGES = {"reading": 1.0, "simulating": 3.0, "coverage": 1.0, "forces": 1.0}
+STAGES = {"reading": 1.0, "simulating": 3.0, "coverage": 1.0, "forces": 1.0, "trust": 2.0}
 
 
 @staged("evaluating", STAGES)
@@ -88,6 +92,8 @@ def evaluate_runs(
     reach("coverage")
     covered = _coverage(first, rows, numbered, size)
     reach("forces")
+    forces = _forces(opened, rows)
+    reach("trust")
     found = Evaluation(
         runs=opened,
         voyages=tuple(names),
@@ -102,7 +108,10 @@ def evaluate_runs(
         coverage=covered,
         baseline_losses=_baseline_losses(first, cut),
         inside=_inside(scored, bands, cut),
-        forces=_forces(opened, rows),
+        forces=forces,
+        trust={run.name: trust_file.of_run(run) for run in opened},
+        residual_tests={run.name: _residual_tests(run, rows) for run in opened},
+        better=_better(opened, scored, cut),
         contradicted=contradicted.list_contradicted(store, names),
         datums={name: found for name in names if (found := store.origin(name)[1]) is not None},
         ship_time=ship_time.of(first.profile.ship.length_m, first.training()),
@@ -217,6 +226,56 @@ def _inside(scored: list, bands: dict[str, np.ndarray | None], cut: Windows) -> 
         rows += [(run, c.name, float(shares[i])) for i, c in enumerate(STATE)]
     schema = {"run": pl.String, "channel": pl.String, "share": pl.Float64}
     return pl.DataFrame(rows, schema=schema, orient="row")
+
+
+def _residual_tests(run: Run, rows: pl.DataFrame) -> tuple[ResidualTest, ...]:
+    """Of what the first seed leaves over in one second, at every pair of neighbouring rows."""
+    pairs = windows.plan(rows.lazy(), 2, 1).collect()
+    if not pairs.height:
+        return ()
+    profile = run.profile
+    cut = windows.cut(rows, pairs, 2, profile.actuator_names, profile.wind_names)
+    simulated = simulate(run.models()[run.config.seeds[0]], cut)
+    errors = (cut.state - simulated)[:, 1, list(VELOCITY_IN_STATE)]
+    inputs = {name: cut.actuator[:, 0, i] for i, name in enumerate(profile.actuator_names)}
+    if profile.has_wind:
+        speed, angle = cut.wind[:, 0, 0], cut.wind[:, 0, 1]
+        inputs |= {"wind_ahead": speed * np.cos(angle), "wind_athwart": speed * np.sin(angle)}
+    stretch = pairs.select(pl.struct("voyage", "segment").rank("dense"))["voyage"].to_numpy()
+    return residual_tests(errors, stretch, inputs)
+
+
+def _better(
+    opened: Sequence[Run], scored: Sequence[tuple[Run, int, scoring.Scores]], cut: Windows
+) -> tuple[Better, ...]:
+    """Every pair of runs, the one with the smaller L first, on the means of their seeds."""
+    if len(opened) < 2:
+        return ()
+    losses = {
+        run.name: np.mean([s.errors["loss"].to_numpy() for r, _, s in scored if r is run], axis=0)
+        for run in opened
+    }
+    expected = {run.name: _expected(run) for run in opened}
+    voyages = cut.plan["voyage"].to_list()
+    pairs = [
+        better((a, b), (losses[a], losses[b]), voyages, (expected[a], expected[b]))
+        for a, b in combinations(sorted(losses, key=lambda name: losses[name].mean()), 2)
+    ]
+    return tuple(one for one in pairs if one is not None)
+
+
+def _expected(run: Run) -> np.ndarray | None:
+    """L of windows that the run itself was tested on: each training window without its voyage, or
+    those of the validation voyages; None without either."""
+    if (known := run.cross_validation()) is not None:
+        return known.filter(pl.col("held_out") == "voyages")["loss"].to_numpy()
+    held, size = run.validation(), run.config.window
+    planned = plan(held, "ref", size) if held.height else held
+    if not planned.height:
+        return None
+    cut = windows.cut(held, planned, size, run.profile.actuator_names, run.profile.wind_names)
+    scores = [scoring.score(model, cut) for model in run.models().values()]
+    return np.mean([one.errors["loss"].to_numpy() for one in scores], axis=0)
 
 
 def _forces(opened: tuple[Run, ...], rows: pl.DataFrame) -> pl.DataFrame | None:

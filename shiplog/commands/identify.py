@@ -15,6 +15,7 @@ from threadpoolctl import threadpool_limits
 from shiplog.commands.bars import reach, staged
 from shiplog.exceptions import listed
 from shiplog.machine import files
+from shiplog.models.coefficients import Parameters
 from shiplog.report.evaluation.identification import PAGE, Identification
 from shiplog.report.evaluation.text_table import inert
 from shiplog.report.result import Answer
@@ -31,7 +32,7 @@ from shiplog.training.physics.held_out import (
 from shiplog.training.physics.model_selection import choose_network, choose_ridge, physics
 from shiplog.training.physics.output_error import Identified
 from shiplog.training.physics.setup import Prepared, prepare
-from shiplog.training.runs import load_model, plausible_model, run_folder
+from shiplog.training.runs import load_model, plausible_model, run_folder, trust_file
 from shiplog.training.runs.load_model import Run
 from shiplog.training.runs.provenance import provenance
 from shiplog.training.runs.run_folder import RunFolder
@@ -96,7 +97,7 @@ def _finish(
     result = Identification(
         done, found.errors, (*found.sentences, *questions), (*found.doubts, *questions),
         baseline_losses(windows.cut(rows, done.windows(), size, *names)),
-        (ship.words(size), ship.advice(size)),
+        (ship.words(size), ship.advice(size)), trust_file.of_run(done),
     )  # fmt: skip
     files.write_text(done.path / PAGE, inert(result.page))
     return done, result
@@ -172,12 +173,12 @@ def _identify(run: RunFolder, ready: Prepared) -> tuple[Found, dict]:
             network, simulator, done, sentence, validated = choose_network(
                 ready, settings, refit, held_out.by_voyage, seed
             )
-            save(run, seed, ready, simulator, done)
+            save(run, seed, ready.start, simulator, done)
             choices |= {f"network of seed {seed}": network.as_json()}
             notes.append(sentence)
             doubts.append(sentence)
         else:
-            save(run, seed, ready, _simulator(ready.model, found), found)
+            save(run, seed, ready.start, _simulator(ready.model, found), found)
     if held_out.by_voyage is not None:
         run.save_cross_validation(held_out.table())
     _band(run, ready, validated)
@@ -203,12 +204,12 @@ def _hold_out(
 def save(
     run: RunFolder,
     seed: int,
-    ready: Prepared,
+    start: Parameters,
     simulator: Simulator,
     found: Identified | None,
 ) -> None:
     """One seed's numbers, for machines and as a TOML that --parameters takes."""
-    start, count = ready.start, len(ready.start.names)
+    count = len(start.names)
     values = simulator.theta[:count]
     source = f"identified by shiplog in {run.name}" if found else start.source
     error = found.standard_error[:count] if found else np.zeros(count)
@@ -242,7 +243,7 @@ def _keep(run: RunFolder, ready: Prepared) -> Found:
     nothing = np.zeros((len(ready.start.values),) * 2)
     simulator = Simulator(ready.model, ready.start.values, nothing)
     for seed in run.config.seeds:
-        save(run, seed, ready, simulator, None)
+        save(run, seed, ready.start, simulator, None)
     states = rollout(ready.model, ready.start.values, ready.data)
     error = states - ready.data.measured
     run.save_band(

@@ -9,7 +9,7 @@ from shiplog.machine.paths import refuse_run
 from shiplog.models import NETWORK, PHYSICS
 from shiplog.report.result import Answer
 from shiplog.training.runs import run_folder
-from shiplog.training.runs.run_checks import refuse_extended
+from shiplog.training.runs.run_checks import refuse_extended, refuse_sheet
 from shiplog.training.runs.run_folder import RunFolder
 
 
@@ -18,6 +18,7 @@ def again_command(store_path: Path, out: Path, path: Path) -> Answer:
     refuse_run(out)
     old = run_folder.open_finished(path)
     refuse_extended(path)
+    refuse_sheet(path)
     return FLOWS[old.kind.family.name](old, out, store_path)
 
 

@@ -1,5 +1,6 @@
 """`shiplog train --model mmg` as a user types it, on short voyages."""
 
+import json
 import math
 import shutil
 import tomllib
@@ -60,7 +61,8 @@ def test_eight_lines_matter_and_the_rest_is_in_the_run_folder(fitted):
 
 def test_the_answer_says_what_was_found(fitted):
     run, reported, content = fitted
-    assert set(content) == {"contract", "run", "label", "windows", "notes", "parameters", "split"}
+    assert set(content) == {"contract", "run", "label", "windows", "notes", "parameters", "split",
+                            "trust"}  # fmt: skip
     assert content["contract"] == 1 and content["windows"] == 6
     assert content["label"] == "mmg identified on ref, without propeller, rudder"
     assert len(content["parameters"]) == 3 + 15 + 10
@@ -71,6 +73,69 @@ def test_the_answer_says_what_was_found(fitted):
     assert content["split"]["training"] == ["trip_1", "trip_2"]
     assert any("held-out voyages" in s for s in content["notes"])
     assert f"Next: shiplog evaluate {run}" in reported
+
+
+def test_every_coefficient_has_a_verdict_with_its_reason(fitted, store, tmp_path):
+    """In the answer, in the page of the training, in trust.json and again of `evaluate`."""
+    run, reported, content = fitted
+    judged = {one["name"]: one for one in content["trust"]}
+    assert list(judged) == [one["name"] for one in content["parameters"]]
+    kept = json.loads((run / "trust.json").read_text(encoding="utf-8"))["coefficients"]
+    assert kept == content["trust"]
+    assert " trusted, " in reported and " not measured." in reported
+    page = (run / "training.md").read_text(encoding="utf-8")
+    assert all(one["reason"] in page for one in judged.values())
+    for one in judged.values():
+        sure = one["own"] <= 0.5 and not one["at_limit"]
+        agree = one["between"] is None or one["between"] <= 0.5 * (one["high"] - one["low"]) / (
+            2 * 1.645 * one["own"]
+        )
+        assert (one["verdict"] == "trusted") == (sure and agree)
+        assert one["limits"][0] <= one["typical"][0] <= one["typical"][1] <= one["limits"][1]
+        assert one["voyages"] <= 2 and one["source"]
+    found = scored(run, store, tmp_path / "scored.json")
+    assert found["trust"] == content["trust"]
+
+
+def test_a_run_of_before_gets_its_verdicts_when_it_is_evaluated(fitted, store, tmp_path):
+    shutil.copytree(fitted[0], tmp_path / "old")
+    (tmp_path / "old" / "trust.json").unlink()
+    found = scored(tmp_path / "old", store, tmp_path / "scored.json")
+    for one, now in zip(found["trust"], fitted[2]["trust"], strict=True):
+        assert one["verdict"] == now["verdict"] and one["own"] == pytest.approx(now["own"])
+    assert (tmp_path / "old" / "trust.json").is_file()
+
+
+def test_the_residuals_of_new_voyages_are_tested(fitted, store, tmp_path):
+    to = tmp_path / "scored.json"
+    assert (
+        call("evaluate", fitted[0], "--store", store, "--voyages", "trip_*", "--json", to)[0] == 0
+    )
+    found = answer(to)["residual_tests"]
+    against = {one["against"] for one in found}
+    assert {"whiteness", "wind_ahead", "wind_athwart"} <= against
+    assert {one["level"] for one in found} == {0.05}
+    assert all(one["rejected"] == (one["p"] < 0.05) for one in found)
+
+
+def test_of_two_runs_the_better_one_is_said(fitted, store, tmp_path):
+    """Against the same run as its starting values, which has no voyage that it was held out of."""
+    code, _, _ = train(store, tmp_path / "start", "--model", "mmg", *BOTH, *HULL, "--no-fit")
+    assert code == 0
+    code, reported, _ = call(
+        "evaluate", tmp_path / "start", fitted[0], "--store", store, "--voyages", "trip_*",
+        "--json", tmp_path / "both.json",
+    )  # fmt: skip
+    assert code == 0
+    content = answer(tmp_path / "both.json")
+    (one,) = content["better"]
+    assert (one["a"], one["b"]) == ("fitted", "start") and one["elsewhere"] is None
+    assert content["runs"]["fitted"]["loss"] / content["runs"]["start"]["loss"] == pytest.approx(
+        one["share"]
+    )
+    assert one["low"] <= one["probability"] <= one["high"] and one["probability"] > 0.5
+    assert "P(fitted is better than start on new voyages like these) is 0." in reported
+    assert content["runs"]["start"]["trust"] == []  # nothing was fitted
 
 
 def test_the_training_windows_fit_better_than_at_the_start(fitted):

@@ -36,9 +36,9 @@ def test_a_parameter_that_cannot_move_is_not_identified_alone():
     start = parameters(wanted, given, "a file")
     for patterns, free in (((), [True] * 3), (("*ahead",), [True, False, False]),
                            (("*_loss", "*astern"), [False, True, True])):  # fmt: skip
-        assert setup._free(patterns, start).tolist() == free
+        assert setup.free_parameters(patterns, start).tolist() == free
     with pytest.raises(RunError, match=r"the plausible spread of thruster\.bow_astern is a share"):
-        setup._free(("*astern",), start)
+        setup.free_parameters(("*astern",), start)
 
 
 def test_a_loss_that_is_huge_but_finite_is_no_stable_start(monkeypatch):

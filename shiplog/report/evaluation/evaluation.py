@@ -14,8 +14,12 @@ from shiplog.exceptions import RunNotEvaluated, SeveralRuns, listed
 from shiplog.nomenclature.contract import CONTRACT
 from shiplog.nomenclature.numbers import counted, figure
 from shiplog.report.evaluation import tables
+from shiplog.report.evaluation import trust as trusted
 from shiplog.report.evaluation.judgement import MEANING, Judgement, force_line, judge
 from shiplog.report.result import Shown, Shows
+from shiplog.simulation.better_model import Better
+from shiplog.simulation.residual_tests import ResidualTest
+from shiplog.training.physics.trust import CoefficientTrust
 from shiplog.training.runs.load_model import Run
 from shiplog.voyages.store import contradicted
 from shiplog.voyages.store.contradicted import Contradicted
@@ -74,6 +78,10 @@ class Evaluation(Shows):
     contradicted   what was recorded on these voyages and contradicts itself
     ship_time      L/U of the first run's training voyages
     shown          its pictures and its page
+    trust          run → what may be believed of each coefficient, by its training voyages; empty
+                   of a network
+    residual_tests run → tests of what it leaves over in one second, on these voyages
+    better         of every pair of runs, P that the first is better on new voyages
     """
 
     runs: tuple[Run, ...]
@@ -90,6 +98,9 @@ class Evaluation(Shows):
     datums: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     ship_time: ShipTime | None = None
     shown: Shown | None = None
+    trust: Mapping[str, tuple[CoefficientTrust, ...]] = field(default_factory=dict)
+    residual_tests: Mapping[str, tuple[ResidualTest, ...]] = field(default_factory=dict)
+    better: tuple[Better, ...] = ()
 
     def __getitem__(self, run: str) -> RunScores:
         """One run's scores, by its name. Raises RunNotEvaluated."""
@@ -177,9 +188,10 @@ class Evaluation(Shows):
     def json(self) -> dict:
         """The contract's JSON: of one run its own, of several that of each by its name."""
         answers = {run.name: self.answer(run) for run in self.runs}
-        return (
-            answers.popitem()[1] if len(answers) == 1 else {"contract": CONTRACT, "runs": answers}
-        )
+        if len(answers) == 1:
+            return answers.popitem()[1]
+        better = [one.as_json() for one in self.better]
+        return {"contract": CONTRACT, "runs": answers, "better": better}
 
     def answer(self, run: Run) -> dict:
         """The contract's JSON for one run, the share of samples inside its 90 % band, and the
@@ -195,6 +207,8 @@ class Evaluation(Shows):
             "judgement": judged.as_json(),
             "band_90": dict(shares.iter_rows()),
             "winds": tables.winds(errors).drop("run").to_dicts(),
+            "trust": [one.as_json() for one in self.trust.get(run.name, ())],
+            "residual_tests": [one.as_json() for one in self.residual_tests.get(run.name, ())],
         }
 
     @property
@@ -221,6 +235,15 @@ class Evaluation(Shows):
         return judge(run.name, errors, self.baseline_losses, length, self.runs[0].config.window)
 
     @property
+    def trust_lines(self) -> list[str]:
+        """What may be believed of each run's coefficients, and what its residuals show."""
+        lines = []
+        for run in self.runs:
+            lines += trusted.coefficient_lines(run.name, self.trust.get(run.name, ()))
+            lines += trusted.residual_lines(run.name, self.residual_tests.get(run.name, ()))
+        return ["", *lines] if lines else []
+
+    @property
     def lines(self) -> list[str]:
         """Markdown: a sentence a run, models and baselines, voyages, the worst windows of the
         first run."""
@@ -231,6 +254,7 @@ class Evaluation(Shows):
         lines = [
             *([self.warning] if self.warning else []),
             *[self.judgement(run).sentence for run in self.runs],
+            *trusted.better_lines(self.better),
             *([self.window_advice] if self.window_advice else []),
             "",
             f"{MEANING} Means over {count} and over seeds:",
@@ -247,6 +271,7 @@ class Evaluation(Shows):
             "",
             tables.windows_table(errors, self.coverage),
         ]
+        lines += self.trust_lines
         if len(self.voyages) == 1 and self.forces is not None:
             lines += ["", force_line(self.forces, self.voyages[0])]
         if self.too_short:

@@ -15,9 +15,11 @@ from shiplog.exceptions import listed
 from shiplog.nomenclature.contract import CONTRACT
 from shiplog.nomenclature.numbers import counted, figure
 from shiplog.report.evaluation import tables
+from shiplog.report.evaluation import trust as trusted
 from shiplog.report.evaluation.judgement import BASELINES
 from shiplog.report.result import Answer
 from shiplog.training.physics.identifiability import SILENT
+from shiplog.training.physics.trust import CoefficientTrust
 from shiplog.training.runs.load_model import Run
 
 PAGE = "training.md"  # in the run folder
@@ -33,6 +35,7 @@ class Identification:
     doubts      those of them that ask for a look: limits, convergence, what no ship has
     baselines   mean L of each on the training windows
     window      how long the windows are in ship times; what would suit the ship better, if anything
+    trust       what may be believed of each coefficient
     """
 
     run: Run
@@ -41,6 +44,7 @@ class Identification:
     doubts: tuple[str, ...]
     baselines: Mapping[str, float]
     window: tuple[str, str] = ("", "")
+    trust: tuple[CoefficientTrust, ...] = ()
 
     def __repr__(self) -> str:
         return f"Identification({self.run!r})"
@@ -80,6 +84,8 @@ class Identification:
             for r in ranked.head(WORST).to_dicts()
         )
         silent = f"{quiet} of {counted(free.height, 'coefficient')} stand where they started"
+        if self.trust:
+            silent = f"Of {counted(len(self.trust), 'coefficient')} {trusted.counts(self.trust)}"
         return f"Worst determined: {named}. {silent}."
 
     @property
@@ -98,8 +104,21 @@ class Identification:
         lines = [f"# {self.run.label}", "", *(f"{line}\n" for line in self.lines), "## Notes", ""]
         lines += [f"- {note}" for note in self.notes]
         if not self.run.given:
-            lines += ["", "## Coefficients", "", tables.parameters_table(self.run.identified())]
+            lines += [
+                "",
+                *self._trusted,
+                "## Coefficients",
+                "",
+                tables.parameters_table(self.run.identified()),
+            ]
         return "\n".join([*lines, ""])
+
+    @property
+    def _trusted(self) -> list[str]:
+        if not self.trust:
+            return []
+        head = ["## What may be trusted", "", trusted.sources(self.trust), ""]
+        return [*head, trusted.coefficients_table(self.trust), ""]
 
     @property
     def json(self) -> dict:
@@ -111,5 +130,6 @@ class Identification:
             "windows": run.windows().height,
             "notes": list(self.notes),
             "parameters": run.identified().to_dicts(),
+            "trust": [one.as_json() for one in self.trust],
             "split": run.config.split.model_dump(mode="json"),
         }

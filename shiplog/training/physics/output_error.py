@@ -91,7 +91,7 @@ def identify(
     before = _used(losses(model, np.array(start, dtype=float), data), weight)
     if not np.isfinite(_used(losses(model, values, data), weight)).all():
         values = _from_short_windows(model, start, width, data, (low, high), free, values)
-    noise = _noise(_used(losses(model, values, data), weight), data)
+    noise = residual_variance(_used(losses(model, values, data), weight), data)
     evaluations, converged, message = 0, True, "converged"
     for _ in range(rounds):
         problem = _Problem(model, start, width, data, free, noise)
@@ -101,7 +101,7 @@ def identify(
         converged = done.status > 0
         message = "converged" if converged else _unsettled(done, model.names, free, most)
         after = _used(losses(model, values, data), weight)
-        now = _noise(after, data)
+        now = residual_variance(after, data)
         steady = abs(now / noise - 1.0) < 0.05
         noise = now
         if steady:
@@ -119,7 +119,7 @@ def identify(
     )
 
 
-def _noise(loss: np.ndarray, data: WindowSeries) -> float:
+def residual_variance(loss: np.ndarray, data: WindowSeries) -> float:
     """σ² = t_c Σ_w ω_w L_w/(3 Σ_w ω_w T_w), LEAST_VARIANCE at least: weighted variance of one
     independent observation of the error, of L of each window [N] and their lengths T_w [s]."""
     samples = 3.0 * float((data.weight * data.dt.sum(1)).sum())

@@ -93,7 +93,7 @@ def prepare(
     model = _stable(model, start.values, data)
     return Prepared(
         model, start, data, voyages, [first[v] for v in voyages],
-        _free(config.physics.free, start), unseen,
+        free_parameters(config.physics.free, start), unseen,
     )  # fmt: skip
 
 
@@ -126,7 +126,7 @@ def _stable(model: Any, values: np.ndarray, data: WindowSeries) -> Any:
     return model  # the identification says what is wrong
 
 
-def _free(patterns: Sequence[str], start: Parameters) -> np.ndarray:
+def free_parameters(patterns: Sequence[str], start: Parameters) -> np.ndarray:
     """Which parameters may move. Raises RunError for a pattern that none has, and where the ridge
     lets none of them move."""
     names = start.names

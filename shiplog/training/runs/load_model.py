@@ -330,7 +330,7 @@ class PhysicalRun(Run):
             hint="train the run again.",
         )
 
-    def _nominal(self) -> Parameters:
+    def nominal(self) -> Parameters:
         """Coefficients of its equations as published or estimated."""
         return self.kind.equations.begin(self.profile, self.config.physics, None).start
 
@@ -339,7 +339,7 @@ class PhysicalRun(Run):
         return own.model, own.theta, own.covariance
 
     def _plain_base(self) -> Base:
-        nominal = self._nominal()
+        nominal = self.nominal()
         seed = self.config.seeds[0]
         simulator, known = self.simulator(seed), self.identified(seed)
         more = len(simulator.theta) - len(nominal.names)

@@ -104,6 +104,15 @@ def refuse_extended(path: Path) -> None:
         )
 
 
+def refuse_sheet(path: Path) -> None:
+    """Raises RunError for a run folder that was made from a trial sheet, and from no voyage."""
+    if (path / "trial_sheet.toml").is_file():
+        raise RunError(
+            f"The run {path} is from a trial sheet, and from no voyage.",
+            hint=f"repeat it with --trial-sheet {path / 'trial_sheet.toml'}.",
+        )
+
+
 def refuse_unended(failures: Mapping[str, str], count: int) -> None:
     """Raises RunError where some of `count` trainings failed. `failures`: name → why."""
     if failures:

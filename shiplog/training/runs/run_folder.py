@@ -10,6 +10,7 @@ them stands in `load_model`.
     <run>/seed<k>/                          see `network_files` and `physics_files`
     <run>/cross_validation.parquet          L of every training window by a fit without its voyage
     <run>/band.safetensors                  how far off a simulation may be
+    <run>/trust.json                        what may be believed of each coefficient: `trust_file`
     <run>/extension.*                       causes that a diagnosis put into it: `extension_file`
     <run>/errors.parquet  rollouts.parquet  of the latest evaluation, per window, step and seed
 
@@ -121,6 +122,12 @@ class RunFolder:
     def save_cross_validation(self, losses: pl.DataFrame) -> None:
         """groups, voyage, window, start (L of the starting values), loss."""
         files.write_frame(self.path / "cross_validation.parquet", losses)
+
+    def cross_validation(self) -> pl.DataFrame | None:
+        """A row a training window, by a fit that did not know its voyage, or its day: held_out
+        (voyages or days), group, window, start, loss; None where nothing was held out."""
+        path = self.path / "cross_validation.parquet"
+        return run_files.table(path) if path.is_file() else None
 
     def save_band(self, band: Band) -> None:
         arrays = {"growth": band.growth, "factor": band.factor}

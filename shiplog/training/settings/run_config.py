@@ -60,6 +60,7 @@ class Physics(Section):
     fit: bool = True  # else the starting values as they are
     parameters: str = ""  # where the starting values are from
     without: tuple[str, ...] = ()  # forces switched off
+    sheet: str | None = None  # name of the trial sheet that it is identified from, of no voyage
     free: tuple[str, ...] = ()  # patterns of the parameters that may move; empty is all
     substeps: int = Field(default=1, ge=1, le=1000)  # Euler steps within each measured one
     folds: int = Field(default=5, ge=0)  # that voyages are held out in; below 2, none is
@@ -108,7 +109,8 @@ class Config(Section):
         if self._family is NETWORK:
             how = f", wind {self.network.wind_input}" if wind else ""
             return f"{self.model} {self.data} ({self.recipe} recipe{how})"
-        how = f"identified on {self.data}" if self.physics.fit else "as given"
+        data = "a trial sheet" if self.physics.sheet else self.data
+        how = f"identified on {data}" if self.physics.fit else "as given"
         off = f", without {listed(self.physics.without)}" if self.physics.without else ""
         return f"{self.model} {how}{off}"
 

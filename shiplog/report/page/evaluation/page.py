@@ -30,6 +30,7 @@ from shiplog.report.page.blocks import (
     share,
 )
 from shiplog.report.page.drawing import gallery
+from shiplog.report.page.evaluation import trust
 from shiplog.report.page.evaluation.source import Source
 
 COVERAGE = ("wind", "drift")
@@ -59,6 +60,7 @@ def of_source(source: Source) -> Page:
             Section("answer", "The answer", _answer(source)),
             Section("where", "Where it shows", _where(source)),
             Section("voyages", "Voyages and windows", _voyages(source)),
+            *_trust(source),
             Section("coverage", "Training and test", [Gallery(gallery(source.content, COVERAGE))]),
             Section("execution", "Execution", _execution(source)),
             Section("terms", "Terms", [Fold("Terms of the method", [_terms()])]),
@@ -212,6 +214,11 @@ def _voyages(source: Source) -> list[Block]:
         store, first = source.subject["store"], worst[0]
         found.append(moment(runs, store, first["voyage"], first["start_s"]))
     return found
+
+
+def _trust(source: Source) -> list[Section]:
+    blocks = trust.blocks(source)
+    return [Section("trust", "What may be trusted", blocks)] if blocks else []
 
 
 def _execution(source: Source) -> list[Block]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -33,11 +33,13 @@ NOTHING = {key: [] for key in ("causes", "ranking", "limits", "wrong", "interval
 class Source:
     """answers   run → the answer of `evaluate --json` for it
     subject   ship, length_m, voyages, window_s, runs, shiplog
+    better    of every pair of runs, as `evaluate --json` has it
     """
 
     content: Content
     answers: Mapping[str, Mapping[str, Any]]
     subject: Mapping[str, Any]
+    better: Sequence[Mapping[str, Any]] = ()
 
 
 def of_evaluation(found: Evaluation, store: Store) -> Source:
@@ -63,7 +65,8 @@ def of_evaluation(found: Evaluation, store: Store) -> Source:
         "shiplog": version("shiplog"),
     }  # fmt: skip
     answers = {run.name: found.answer(run) | {"worst": _worst(found, run)} for run in found.runs}
-    return Source(Content(NOTHING, _pictures(found, voyages)), answers, subject)
+    better = [one.as_json() for one in found.better]
+    return Source(Content(NOTHING, _pictures(found, voyages)), answers, subject, better)
 
 
 def save(source: Source, folder: Path) -> None:

@@ -1,0 +1,82 @@
+"""The trust in a run's coefficients, judged once and kept in its folder as trust.json."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+
+from shiplog.machine import files
+from shiplog.nomenclature.contract import CONTRACT
+from shiplog.simulation.sensitivities import normal
+from shiplog.simulation.window_series import pick, series
+from shiplog.training.physics import trust
+from shiplog.training.physics.output_error import residual_variance
+from shiplog.training.physics.trust import CoefficientTrust, Information
+from shiplog.training.runs.load_model import PhysicalRun, Run
+from shiplog.training.settings import run_files
+from shiplog.voyages.windows import windows
+
+log = logging.getLogger(__name__)
+
+FILE = "trust.json"
+SHEET = "trial_sheet.toml"  # of a run from a trial sheet, which has no voyage to judge by
+
+
+def of_run(run: Run) -> tuple[CoefficientTrust, ...]:
+    """What may be believed of the run's coefficients, as they were identified from its training
+    voyages. An empty tuple of a network, of a run that was fitted to nothing, and of an extended
+    one: its coefficients were fitted again together with its causes, and no interval was kept.
+
+    A run that was made before there was a trust.json gets one, if its folder can be written.
+    """
+    if run.given or run.extension is not None or not isinstance(run, PhysicalRun):
+        return ()
+    path = run.path / FILE
+    if path.is_file():
+        return _read(run)
+    if (run.path / SHEET).is_file():
+        return ()
+    judged = judge(run)
+    try:
+        save(run, judged)
+    except OSError as error:  # a colleague's folder; what was judged is good all the same
+        log.info("%s is not kept: %s.", path, error.strerror)
+    return judged
+
+
+def judge(run: PhysicalRun) -> tuple[CoefficientTrust, ...]:
+    """By the run's training windows, at its coefficients."""
+    seed = run.config.seeds[0]
+    identified, simulator = run.identified(seed), run.simulator(seed)
+    names = (run.profile.actuator_names, run.profile.wind_names)
+    cut = windows.cut(run.training(), run.windows(), run.config.window, *names)
+    data, count = series(cut), identified.height
+    every = normal(simulator.model, simulator.theta, data, tuple(range(count)))
+    variance = residual_variance(every.loss, data)
+    voyages = np.array(cut.plan["voyage"].to_list())
+    grams, pulls = {}, {}
+    for voyage in dict.fromkeys(voyages.tolist()):
+        own = pick(data, voyages == voyage)
+        one = normal(simulator.model, simulator.theta, own, tuple(range(count)))
+        grams[voyage], pulls[voyage] = one.gram / variance, one.pull.sum(0) / variance
+    nominal = run.nominal()
+    return trust.judge(
+        identified, simulator.covariance[:count, :count], (nominal.low, nominal.high),
+        Information(grams, pulls), run.config.physics.parameters or nominal.source,
+    )  # fmt: skip
+
+
+def save(run: Run, judged: tuple[CoefficientTrust, ...]) -> None:
+    content = {"contract": CONTRACT, "coefficients": [one.as_json() for one in judged]}
+    files.write_json(run.path / FILE, content)
+
+
+def _read(run: Run) -> tuple[CoefficientTrust, ...]:
+    """Raises RunError."""
+    path = run.path / FILE
+    found = run_files.json_of(path)
+    try:
+        return tuple(trust.from_json(one) for one in found["coefficients"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise run_files.unreadable(path, error) from error
