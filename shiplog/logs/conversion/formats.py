@@ -25,3 +25,10 @@ def recognise(path: Path) -> Format:
 def convertible(path: Path, profile: Profile | None) -> bool:
     """Whether logs can be made of it; the reader of logs says what is wrong with the others."""
     return recognise(path).sure(path, profile)
+
+
+def voyages_in(folder: Path) -> list[Path]:
+    """The files of a folder that recorders wrote, each a voyage, in the order of their names."""
+    files = sorted(path for path in folder.glob("[!.]*") if path.is_file())
+    recorders = [one for one in FORMATS if one.voyage]
+    return [path for path in files if any(one.takes(path) for one in recorders)]
