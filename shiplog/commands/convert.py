@@ -134,7 +134,7 @@ def draft(path: Path, vessel: str | None = None) -> str:
             done = Converted()
             times = dict([found.clock] if found.clock else [])
             (target,) = _each(source, None, folder, done, times)
-            text = draft_log(target, vessel)
+            text = draft_log(target, vessel, path.name)
         for what in done.lost.values():
             log.warning("%s: left out: %s", path.name, what)
         return recognised(text, path, tuple(done.lost.values())) + clock_section(found.clock)

@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from shiplog.logs.conversion import bags, copies, nmea, nmea_folder, signalk, table_rows
+from shiplog.logs.conversion import (
+    bags,
+    copies,
+    dataflash,
+    nmea,
+    nmea_folder,
+    signalk,
+    table_rows,
+)
 from shiplog.logs.conversion.original import Format
 from shiplog.ship_profile.profile import Profile
 
@@ -12,6 +20,7 @@ FORMATS = (
     bags.FORMAT,
     nmea_folder.FORMAT,
     copies.FORMAT,
+    dataflash.FORMAT,
     signalk.FORMAT,
     nmea.FORMAT,
     table_rows.FORMAT,  # takes what is left
