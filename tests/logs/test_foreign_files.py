@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gzip
 import io
-import struct
 import zipfile
 
 import polars as pl
@@ -27,10 +26,8 @@ def zipped(**files: str | bytes) -> bytes:
     return stream.getvalue()
 
 
-PACKET = struct.pack(">Q", 1_659_169_701_507_935) + b"\xfd\x09\x00\x00\x01\x01\x01\x00\x00\x00"
 FILES = {  # what it is called, what is in it → what it is, and the tool that helps
     "2021.log": (b"FMT, 128, 89, FMT, BBnNZ, Type,Length\n" * 9, "DataFlash", "mavlogdump.py"),
-    "flight.tlog": (PACKET * 9, "MAVLink telemetry", "mavlogdump.py"),
     "flight.ulg": (b"ULog\x01\x12\x35\x01" + bytes(90), "ULog", "ulog2csv"),
     "fix.mat": (b"MATLAB 5.0 MAT-file, Platform: GLNXA64" + bytes(90), "MATLAB", "writetable"),
     "fix73.mat": (b"MATLAB 7.3 MAT-file, Platform" + bytes(90), "MATLAB", "writetable"),

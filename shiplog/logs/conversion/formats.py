@@ -8,6 +8,7 @@ from shiplog.logs.conversion import (
     bags,
     copies,
     dataflash,
+    mavlink,
     nmea,
     nmea_folder,
     signalk,
@@ -21,6 +22,7 @@ FORMATS = (
     nmea_folder.FORMAT,
     copies.FORMAT,
     dataflash.FORMAT,
+    mavlink.FORMAT,
     signalk.FORMAT,
     nmea.FORMAT,
     table_rows.FORMAT,  # takes what is left

@@ -20,7 +20,6 @@ START_BYTES = 65_536  # that tell a file by its content
 BINARY_SHARE = 0.01  # of zero bytes at the start: texts have none, but for UTF-16, which is marked
 MARKS = (b"\xff\xfe", b"\xfe\xff")  # of UTF-16
 BLANKS = b"\xef\xbb\xbf \t\r\n"  # before a text begins, the mark of UTF-8 among them
-TELEMETRY_US = (1_000_000_000_000_000, 4_000_000_000_000_000)  # of 2001 to 2096
 FOLDER = "shiplog reads the folder of these tables"
 TABLE = "shiplog reads that table"
 Test = Callable[[bytes, Path], bool]
@@ -69,15 +68,6 @@ def _zip_of(*names: str) -> Test:
     return test
 
 
-def _telemetry(start: bytes, path: Path) -> bool:
-    """MAVLink packets, each behind its time [µs] in eight bytes, the highest first."""
-    low, high = TELEMETRY_US
-    return (
-        len(start) > 9 and start[8] in (0xFE, 0xFD)
-        and low < int.from_bytes(start[:8], "big") < high
-    )  # fmt: skip
-
-
 def _json(start: bytes, path: Path) -> bool:
     line = start.lstrip(BLANKS).split(b"\n", 1)[0].strip()
     if not line.startswith((b"{", b"[")):
@@ -114,7 +104,6 @@ def _canboat(tool: str) -> str:
 
 KINDS = (
     Kind("an ArduPilot DataFlash log as text", MAVLINK_WAY, _text(r"^FMT, ?128, ?89, ?FMT")),
-    Kind("a MAVLink telemetry log", MAVLINK_WAY, _telemetry),
     Kind("a PX4 ULog", "make tables of it, one a topic, with ulog2csv of the Python package "
          "pyulog: ulog2csv -o {stem} {file}; " + FOLDER, _begins(b"ULog\x01\x12\x35")),
     Kind("a MATLAB file", "write its variables as a table, in MATLAB with writetable or in Python "
