@@ -10,6 +10,7 @@ from shiplog.logs.conversion import (
     dataflash,
     mavlink,
     nmea,
+    nmea2000,
     nmea_folder,
     signalk,
     table_rows,
@@ -23,6 +24,7 @@ FORMATS = (
     copies.FORMAT,
     dataflash.FORMAT,
     mavlink.FORMAT,
+    nmea2000.FORMAT,
     signalk.FORMAT,
     nmea.FORMAT,
     table_rows.FORMAT,  # takes what is left

@@ -83,10 +83,6 @@ MAVLINK_WAY = (
     "make tables of it, one a kind of message, with mavlogdump.py of the Python package pymavlink: "
     "mavlogdump.py --format csv --types GPS {file} > {stem}/GPS.csv, and so on; " + FOLDER
 )
-CANBOAT_WAY = (
-    "decode it with analyzer of canboat, {tool} | analyzer -json, and make a table of each PGN, "
-    "with its timestamp; " + FOLDER
-)
 GPSBABEL_WAY = (
     "gpsbabel -i {format} -f {file} -o unicsv -F {stem}.csv makes a table of its track; " + TABLE
     + ". A ship's model needs a heading, too, which a track does not have"
@@ -96,10 +92,6 @@ SPREADSHEET_WAY = "save its sheet as CSV in the program that made it; " + TABLE
 
 def _gpsbabel(name: str) -> str:
     return GPSBABEL_WAY.replace("{format}", name)
-
-
-def _canboat(tool: str) -> str:
-    return CANBOAT_WAY.replace("{tool}", tool)
 
 
 KINDS = (
@@ -137,14 +129,6 @@ KINDS = (
          "its NMEA 0183 sentences as a text, one a line; shiplog reads both",
          _begins(b"\xd4\xc3\xb2\xa1", b"\xa1\xb2\xc3\xd4", b"\x4d\x3c\xb2\xa1",
                  b"\xa1\xb2\x3c\x4d", b"\x0a\x0d\x0d\x0a")),
-    Kind("a candump of a CAN bus (NMEA 2000)", _canboat("candump2analyzer {file}"),
-         _text(r"\A\(\d+\.\d+\) +\S+ +[0-9A-Fa-f]{3,8}#")),
-    Kind("a candump of a CAN bus (NMEA 2000)", _canboat("candump2analyzer {file}"),
-         _text(r"\A(\(\d+\.\d+\) +)?\w+ +[0-9A-Fa-f]{8} +\[\d\]( +[0-9A-Fa-f]{2})+")),
-    Kind("raw NMEA 2000", _canboat("cat {file}"), _text(
-        r"\A\d{4}-\d\d-\d\d[T-]\d\d:\d\d:\d\d[.,]?\d*Z?,\d+,\d{5,6},\d+,\d+,\d+,[0-9a-f]{2},")),
-    Kind("raw NMEA 2000", _canboat("cat {file}"),
-         _text(r"\A\d\d:\d\d:\d\d\.\d+ [RT] [0-9A-Fa-f]{8}( [0-9A-Fa-f]{2})+")),
     Kind("a Signal K log", "let the server write NMEA 0183, with its plugin "
          "signalk-to-nmea0183, and log that; or make a table of it, one row a time and one column "
          "a path; " + TABLE, _both(_json, _text(r'"updates"'))),
