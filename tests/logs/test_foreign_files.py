@@ -28,7 +28,6 @@ def zipped(**files: str | bytes) -> bytes:
 
 FILES = {  # what it is called, what is in it → what it is, and the tool that helps
     "2021.log": (b"FMT, 128, 89, FMT, BBnNZ, Type,Length\n" * 9, "DataFlash", "mavlogdump.py"),
-    "flight.ulg": (b"ULog\x01\x12\x35\x01" + bytes(90), "ULog", "ulog2csv"),
     "fix.mat": (b"MATLAB 5.0 MAT-file, Platform: GLNXA64" + bytes(90), "MATLAB", "writetable"),
     "fix73.mat": (b"MATLAB 7.3 MAT-file, Platform" + bytes(90), "MATLAB", "writetable"),
     "trial.h5": (b"\x89HDF\r\n\x1a\n" + bytes(90), "HDF5", "h5py"),

@@ -14,6 +14,7 @@ from shiplog.logs.conversion import (
     nmea_folder,
     signalk,
     table_rows,
+    ulog,
 )
 from shiplog.logs.conversion.original import Format
 from shiplog.ship_profile.profile import Profile
@@ -24,6 +25,7 @@ FORMATS = (
     copies.FORMAT,
     dataflash.FORMAT,
     mavlink.FORMAT,
+    ulog.FORMAT,
     nmea2000.FORMAT,
     signalk.FORMAT,
     nmea.FORMAT,

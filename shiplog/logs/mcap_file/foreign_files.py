@@ -96,8 +96,6 @@ def _gpsbabel(name: str) -> str:
 
 KINDS = (
     Kind("an ArduPilot DataFlash log as text", MAVLINK_WAY, _text(r"^FMT, ?128, ?89, ?FMT")),
-    Kind("a PX4 ULog", "make tables of it, one a topic, with ulog2csv of the Python package "
-         "pyulog: ulog2csv -o {stem} {file}; " + FOLDER, _begins(b"ULog\x01\x12\x35")),
     Kind("a MATLAB file", "write its variables as a table, in MATLAB with writetable or in Python "
          "with scipy.io.loadmat; " + TABLE,
          _begins(b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file")),
