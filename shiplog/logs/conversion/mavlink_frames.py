@@ -16,6 +16,7 @@ from pathlib import Path
 from types import ModuleType
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from shiplog.nomenclature.units import UNIX_NS, YEAR_2000_NS, YEAR_2100_NS
 
@@ -156,7 +157,7 @@ def _messages(
     """The frames of one kind and length; a payload that was cut at zeros is filled up again."""
     head = V1_HEAD if marker == V1 else V2_HEAD
     dtype = _dtype(kind)
-    frames = raw[at[:, None] + np.arange(STAMP_BYTES + head + length + CRC_BYTES)]
+    frames = sliding_window_view(raw, STAMP_BYTES + head + length + CRC_BYTES)[at]
     payload = frames[:, STAMP_BYTES + head : -CRC_BYTES]
     sound = _crc(frames[:, STAMP_BYTES + 1 : -CRC_BYTES], kind.crc_extra) == (  # type: ignore
         frames[:, -2] | frames[:, -1].astype(np.uint16) << 8

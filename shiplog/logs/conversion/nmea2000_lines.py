@@ -9,52 +9,87 @@ Actisense, NMEA 2000 ASCII output format; Digital Yacht, iKonvert serial protoco
 
 from __future__ import annotations
 
-import base64
-import binascii
 import re
 from array import array
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
-from itertools import pairwise
+from functools import cached_property
+from itertools import chain, islice, pairwise
 
 import numpy as np
+import polars as pl
 
 from shiplog.nomenclature.units import SECOND_NS
 
-HEX = "[0-9A-Fa-f]"
+BLOCK_LINES = 100_000  # read at once
 DAY_NS, IKONVERT_NS = 86_400 * SECOND_NS, 1_000 * SECOND_NS
 LEAST_UNIX_S = 100_000_000  # seconds since 1970; what is less counts from the start of a log
 PDU2 = 240  # PDU formats from there on are to all, and the next byte is a part of the PGN
+FRAME_BYTES = 8
+COMMENTS = ("#", "$", "//", ";")  # beginnings of lines that are no message, such as a status
 
 
-@dataclass(frozen=True, slots=True)
-class Frame:
-    """One line: its stamp in the notation's own clock [ns], -1 without one."""
-
-    stamp: int
-    pgn: int
-    source: int
-    data: bytes
-
-
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Notation:
     """A way to write the bus.
 
     name     what wrote it
-    line     a line of it matches from its beginning
-    read     the frame of a match; None where it is none of NMEA 2000. Raises ValueError
+    line     pattern of a line. Its groups: day, h, m, s and part (of a second) of a stamp, `id` (a
+             CAN identifier) or pgn and src, len (bytes, to be checked), data
+    base     of pgn and src; coded: how data are written
     wraps_ns after which its stamps begin again; 0 where they do not
     frames   whether each line is a frame of the bus, and not a whole message
     """
 
     name: str
-    line: re.Pattern[str]
-    read: Callable[[re.Match[str]], Frame | None]
+    line: str
+    base: int = 10
+    coded: str = "hex"
     wraps_ns: int = 0
     frames: bool = True
+
+    @cached_property
+    def pattern(self) -> re.Pattern[str]:
+        return re.compile(self.line)
+
+    def has(self, group: str) -> bool:
+        return group in self.pattern.groupindex
+
+
+def _notation(name: str, line: str, **more) -> Notation:
+    return Notation(name, line.replace("H", "[0-9A-Fa-f]"), **more)
+
+
+NOTATIONS = (
+    # (1502979132.106111) can0 18EEFF01#05A0BE1C00A0A0C0
+    _notation("candump -L",
+              r"^\((?P<s>\d+)\.(?P<part>\d+)\)\s+\S+\s+(?P<id>H{8})#(?P<data>(?:HH){0,8})"
+              r"(?:\s+[RT])?\s*$"),
+    #  (1436509053.850870)  can0  09F8027F   [8]  00 FC 10 3B FF 7F FF FC; the stamp is optional
+    _notation("candump",
+              r"^\s*(?:\(\s*(?:(?P<day>\d{4}-\d\d-\d\d)\s+(?P<h>\d\d):(?P<m>\d\d):)?(?P<s>\d+)"
+              r"\.(?P<part>\d+)\)\s+)?(?:\S+\s+(?:[RT]X\s+-\s+-\s+)?|<0x)(?P<id>H{8})>?\s+"
+              r"\[(?P<len>\d)\](?P<data>(?:\s+HH)+)(?:\s+'.*')?\s*$"),
+    # 2016-02-28T19:57:02.364Z,2,127250,7,255,8,ff,10,3b,ff,7f,ce,f5,fc
+    _notation("canboat",
+              r"^(?P<day>\d{4}-\d\d-\d\d)[T-](?P<h>\d\d):(?P<m>\d\d):(?P<s>\d\d)"
+              r"(?:[.,](?P<part>\d+))?Z?,\d+,(?P<pgn>\d+),(?P<src>\d+),\d+,(?P<len>\d+)"
+              r"(?P<data>(?:,HH)+)\s*$", frames=False),
+    # 17:33:21.107 R 19F51323 01 2F 30 70 00 2F 30 70; T is what the gateway itself sent
+    _notation("YDWG",
+              r"^(?:(?P<h>\d\d):(?P<m>\d\d):(?P<s>\d\d)\.(?P<part>\d+)\s+[RT]\s+)?(?P<id>H{8})"
+              r"(?P<data>(?:\s+HH)+)\s*$", wraps_ns=DAY_NS),
+    # A173321.107 23FF7 1F513 012F3070002F3070: source, destination and priority, then the PGN
+    _notation("Actisense",
+              r"^(?:A(?P<h>\d\d)(?P<m>\d\d)(?P<s>\d\d)\.(?P<part>\d+)\s+)?(?P<src>HH)HHH\s+"
+              r"(?P<pgn>H{5,6})\s+(?P<data>(?:HH)+)\s*$", base=16, wraps_ns=DAY_NS, frames=False),
+    # !PDGY,127257,3,17,255,0.563,AP9/UgAh/v8=: the timer counts to 1000 s
+    _notation("iKonvert",
+              r"^!PDGY,(?P<pgn>\d+),\d*,(?P<src>\d+),\d*,(?P<s>\d+)(?:\.(?P<part>\d+))?,"
+              r"(?P<data>[A-Za-z0-9+/]+=*)\s*$", coded="base64", wraps_ns=IKONVERT_NS,
+              frames=False),
+)  # fmt: skip
 
 
 @dataclass(slots=True)
@@ -66,13 +101,15 @@ class Rows:
     stamp: array = field(default_factory=lambda: array("q"))
     payload: bytearray = field(default_factory=bytearray)
 
-    def add(self, place: int, stamp: int, data: bytes) -> None:
-        self.place.append(place)
-        self.stamp.append(stamp)
-        self.payload += data[: self.width].ljust(self.width, b"\xff")  # what is not sent is none
+    def add(self, place: Iterable[int], stamp: Iterable[int], data: Iterable[bytes]) -> None:
+        """Messages; what of a payload was not sent has no value."""
+        self.place.extend(place)
+        self.stamp.extend(stamp)
+        width = self.width
+        self.payload += b"".join(one[:width].ljust(width, b"\xff") for one in data)
 
     def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(place [n], stamp [n] ns, payload [n, width])."""
+        """(place [n], stamp [n] ns or -1, payload [n, width])."""
         raw = np.frombuffer(bytes(self.payload), np.uint8).reshape(-1, self.width)
         return np.array(self.place, np.int64), np.array(self.stamp, np.int64), raw
 
@@ -83,7 +120,7 @@ class Bus:
 
     rows      by PGN and source address
     others    how many messages of other kinds
-    damaged   lines that are of the notation and cannot be read; incomplete: fast packets
+    damaged   lines that are no comment and cannot be read; incomplete: fast packets
     """
 
     notation: Notation
@@ -99,12 +136,11 @@ def notation_of(lines: Iterable[str], share: float) -> Notation | None:
     counts: Counter[str] = Counter()
     filled = 0
     for line in lines:
-        text = line.strip()
-        if not text or text.startswith(("#", "$PDGY")):
+        if not line.strip() or line.startswith(COMMENTS):
             continue
         filled += 1
-        counts.update(one.name for one in NOTATIONS if one.line.match(text))
-    if not filled or not counts:
+        counts.update(one.name for one in NOTATIONS if one.pattern.match(line))
+    if not counts:
         return None
     best = max(NOTATIONS, key=lambda one: counts[one.name])
     return best if counts[best.name] >= share * filled else None
@@ -120,49 +156,95 @@ def read_lines(
     fast    PGNs that are sent as fast packets
     deltas  stamps count from the line before
     """
-    bus = Bus(notation)
-    joined, total = _Joined(), 0
-    match, read, rows = notation.line.match, notation.read, bus.rows
-    for place, line in enumerate(lines):
-        found = match(line.strip())
-        if found is None:
-            bus.damaged += _is_damaged(line)
-            continue
-        try:
-            frame = read(found)
-        except ValueError:
-            bus.damaged += 1
-            continue
-        if frame is None:
-            continue
-        pgn, data, stamp = frame.pgn, frame.data, frame.stamp
+    bus, joined, elapsed = Bus(notation), _Joined(), 0
+    stream = iter(lines)
+    while block := list(islice(stream, BLOCK_LINES)):
+        found = _parsed(block, notation)
+        known = found.filter(pl.col("data").is_not_null())
+        bus.damaged += sum(map(_is_damaged, found.filter(pl.col("data").is_null())["line"]))
+        known = known.with_columns(pl.col("place") + bus.lines)
+        bus.lines += len(block)
         if deltas:
-            stamp = total = total + stamp
-        width = widths.get(pgn)
-        if width is None:
-            bus.others[pgn] += 1
-            continue
-        if pgn in fast and (notation.frames or len(data) <= 8):
-            whole = joined.add((pgn, frame.source), place, stamp, data)
-            if whole is None:
-                continue
-            place, stamp, data = whole
-        key = pgn, frame.source
-        if key not in rows:
-            rows[key] = Rows(width)
-        rows[key].add(place, stamp, data)
-    bus.lines = place + 1 if rows or bus.others else 0
+            known = known.with_columns(pl.col("stamp").cum_sum() + elapsed)
+            elapsed = known["stamp"][-1] if known.height else elapsed
+        wanted = known.filter(pl.col("pgn").is_in(list(widths)))
+        counts = known.filter(~pl.col("pgn").is_in(list(widths)))["pgn"].value_counts()
+        bus.others.update(dict(counts.iter_rows()))
+        _take(bus, wanted, widths, fast, joined)
     bus.incomplete = joined.broken
     return bus
 
 
+def _take(
+    bus: Bus, wanted: pl.DataFrame, widths: dict[int, int], fast: frozenset[int], joined: _Joined
+) -> None:
+    """Messages of a block into the rows of their kind and sender."""
+    for (pgn, source), part in wanted.group_by("pgn", "source", maintain_order=True):
+        key = int(pgn), int(source)  # type: ignore[call-overload]
+        columns = [part[name].to_list() for name in ("place", "stamp", "data")]
+        if key[0] in fast:
+            whole = [
+                one for row in zip(*columns, strict=True)
+                if (one := joined.add(key, *row, bus.notation.frames)) is not None
+            ]  # fmt: skip
+            if not whole:
+                continue
+            columns = [list(column) for column in zip(*whole, strict=True)]
+        bus.rows.setdefault(key, Rows(widths[key[0]])).add(*columns)
+
+
+def _parsed(block: list[str], notation: Notation) -> pl.DataFrame:
+    """place, line, stamp [ns, -1 without one], pgn, source and data of lines; no data where a line
+    is not of the notation."""
+    groups = pl.col("line").str.extract_groups(notation.line)
+    table = pl.DataFrame({"line": block}).with_row_index("place").with_columns(
+        pl.col("place").cast(pl.Int64), groups.alias("of")
+    ).unnest("of")  # fmt: skip
+    if notation.has("id"):
+        number = pl.col("id").str.to_integer(base=16, strict=False)
+        formatted, specific = (number // 65536) % 256, (number // 256) % 256
+        pgn = (number // 2**24) % 4 * 65536 + formatted * 256
+        pgn += pl.when(formatted >= PDU2).then(specific).otherwise(0)
+        source = number % 256
+    else:
+        pgn, source = (
+            pl.col(name).str.to_integer(base=notation.base, strict=False) for name in ("pgn", "src")
+        )
+    if notation.coded == "hex":
+        data = pl.col("data").str.replace_all(r"[\s,]+", "").str.decode("hex", strict=False)
+    else:
+        short = (4 - pl.col("data").str.len_bytes() % 4) % 4
+        whole = pl.col("data") + pl.lit("=").repeat_by(short).list.join("")
+        data = whole.str.decode("base64", strict=False)
+    if notation.has("len"):
+        length = pl.col("len").cast(pl.Int64, strict=False)
+        data = pl.when(data.bin.size() == length).then(data)
+    return table.select(
+        "place", "line", _stamp(notation).alias("stamp"), pgn.cast(pl.Int64).alias("pgn"),
+        source.cast(pl.Int64).alias("source"), data.alias("data"),
+    )  # fmt: skip
+
+
+def _stamp(notation: Notation) -> pl.Expr:
+    """ns of a line's stamp in the clock of its notation; -1 without one."""
+
+    def whole(name: str) -> pl.Expr:
+        return pl.col(name).cast(pl.Int64, strict=False)
+
+    part = pl.col("part").str.slice(0, 9).str.pad_end(9, "0").cast(pl.Int64, strict=False)
+    stamp = whole("s") * SECOND_NS + part.fill_null(0)
+    if notation.has("h"):
+        stamp += (whole("h").fill_null(0) * 60 + whole("m").fill_null(0)) * 60 * SECOND_NS
+    if notation.has("day"):
+        day = pl.col("day").str.to_date("%Y-%m-%d", strict=False).cast(pl.Int64)
+        stamp += day.fill_null(0) * DAY_NS
+    return stamp.fill_null(-1)
+
+
 def counts_from_the_line_before(lines: Iterable[str], notation: Notation) -> bool:
     """Whether stamps are the time since the last line, as of candump -td: small and unordered."""
-    stamps = []
-    for line in lines:
-        if found := notation.line.match(line.strip()):
-            frame = notation.read(found)
-            stamps += [frame.stamp] if frame else []
+    table = _parsed(list(lines), notation).filter(pl.col("data").is_not_null())
+    stamps = table["stamp"].to_list()
     small = bool(stamps) and 0 <= max(stamps) < LEAST_UNIX_S * SECOND_NS
     return small and not notation.wraps_ns and any(b < a for a, b in pairwise(stamps))
 
@@ -170,7 +252,7 @@ def counts_from_the_line_before(lines: Iterable[str], notation: Notation) -> boo
 def _is_damaged(line: str) -> bool:
     """Whether a line that is in no notation is more than a comment or a status."""
     text = line.strip()
-    return bool(text) and not text.startswith(("#", "$", "//", ";"))
+    return bool(text) and not text.startswith(COMMENTS)
 
 
 class _Joined:
@@ -181,9 +263,12 @@ class _Joined:
         self.broken = 0
 
     def add(
-        self, key: tuple[int, int], place: int, stamp: int, data: bytes
+        self, key: tuple[int, int], place: int, stamp: int, data: bytes, frames: bool
     ) -> tuple[int, int, bytes] | None:
-        """Place and stamp of the first frame, and the payload, once it is whole."""
+        """Place and stamp of the first frame, and the payload, once it is whole; a line that is no
+        frame and longer than one is whole itself."""
+        if not frames and len(data) > FRAME_BYTES:
+            return place, stamp, data
         if not data:
             return None
         counter, number = data[0] >> 5, data[0] & 31
@@ -209,110 +294,8 @@ class _Joined:
         return place, stamp, payload[:length]
 
 
-def parted(identifier: int) -> tuple[int, int]:
-    """(PGN, source address) of a CAN identifier of 29 bits, ISO 11783-3."""
-    formatted, specific = identifier >> 16 & 0xFF, identifier >> 8 & 0xFF
-    pgn = (identifier >> 24 & 3) << 16 | formatted << 8
-    return (pgn | specific if formatted >= PDU2 else pgn), identifier & 0xFF
-
-
-_KNOWN: dict[str, tuple[int, int]] = {}
-
-
-def _of_identifier(text: str) -> tuple[int, int]:
-    found = _KNOWN.get(text)
-    if found is None:
-        found = _KNOWN[text] = parted(int(text, 16) & 0x1FFFFFFF)
-    return found
-
-
-def decimal_ns(text: str) -> int:
-    """Seconds in decimals as whole ns."""
-    whole, _, part = text.partition(".")
-    return int(whole) * SECOND_NS + int(part[:9].ljust(9, "0"))
-
-
-def _clock_ns(hours: str, minutes: str, seconds: str) -> int:
-    return (int(hours) * 60 + int(minutes)) * 60 * SECOND_NS + decimal_ns(seconds)
-
-
-def _candump(found: re.Match[str]) -> Frame:
-    """`(1502979132.106111) can0 18EEFF01#05A0BE1C00A0A0C0`, of candump -L."""
-    pgn, source = _of_identifier(found[2])
-    return Frame(decimal_ns(found[1]), pgn, source, bytes.fromhex(found[3]))
-
-
-def _candump_screen(found: re.Match[str]) -> Frame:
-    """` (1436509053.850870)  can0  09F8027F   [8]  00 FC 10 3B FF 7F FF FC`, the stamp optional."""
-    pgn, source = _of_identifier(found[2])
-    stamp = -1
-    if text := found[1]:
-        stamp = _date_ns(text) if "-" in text else decimal_ns(text)
-    return Frame(stamp, pgn, source, bytes.fromhex(found[4])[: int(found[3])])
-
-
-def _canboat(found: re.Match[str]) -> Frame:
-    """`2016-02-28T19:57:02.364Z,2,127250,7,255,8,ff,10,3b,ff,7f,ce,f5,fc`."""
-    data = bytes.fromhex(found[5].replace(",", ""))
-    if len(data) != int(found[4]):
-        raise ValueError("not as long as it says")
-    return Frame(_date_ns(found[1]), int(found[2]), int(found[3]), data)
-
-
-def _ydwg(found: re.Match[str]) -> Frame:
-    """`17:33:21.107 R 19F51323 01 2F 30 70 00 2F 30 70`; T is what the gateway itself sent."""
-    pgn, source = _of_identifier(found[4])
-    stamp = _clock_ns(found[1], found[2], found[3]) if found[1] else -1
-    return Frame(stamp, pgn, source, bytes.fromhex(found[5]))
-
-
-def _actisense(found: re.Match[str]) -> Frame:
-    """`A173321.107 23FF7 1F513 012F3070002F3070`: source, destination and priority, then PGN."""
-    stamp = _clock_ns(found[1], found[2], found[3]) if found[1] else -1
-    return Frame(stamp, int(found[5], 16), int(found[4][:2], 16), bytes.fromhex(found[6]))
-
-
-def _ikonvert(found: re.Match[str]) -> Frame:
-    """`!PDGY,127257,3,17,255,0.563,AP9/UgAh/v8=`: the timer counts to 1000 s."""
-    try:
-        data = base64.b64decode(found[4] + "=" * (-len(found[4]) % 4), validate=True)
-    except binascii.Error as error:
-        raise ValueError(str(error)) from error
-    return Frame(decimal_ns(found[3]), int(found[1]), int(found[2]), data)
-
-
-def _date_ns(text: str) -> int:
-    """ISO in UTC, with T, a space or a hyphen between date and time of day."""
-    day, clock = text[:10], text[11:].removesuffix("Z").replace(",", ".")
-    when = datetime.fromisoformat(day).replace(tzinfo=UTC)
-    hours, minutes, seconds = clock.split(":")
-    return int(when.timestamp()) * SECOND_NS + _clock_ns(hours, minutes, seconds)
-
-
-def _pattern(text: str) -> re.Pattern[str]:
-    return re.compile(text.replace("H", HEX))
-
-
-NOTATIONS = (
-    Notation("candump -L", _pattern(r"\((\d+\.\d+)\)\s+\S+\s+(H{8})#((?:HH){0,8})(?:\s+[RT])?$"),
-             _candump),
-    Notation("candump", _pattern(r"(?:\(\s*([\d\-: .]+)\)\s+)?(?:\S+\s+(?:[RT]X\s+-\s+-\s+)?|<0x)"
-                                 r"(H{8})>?\s+\[(\d)\]((?:\s+HH)+)(?:\s+'.*')?$"),
-             _candump_screen),
-    Notation("canboat", _pattern(
-        r"(\d{4}-\d\d-\d\d[T-]\d\d:\d\d:\d\d(?:[.,]\d+)?Z?),\d+,(\d+),(\d+),\d+,(\d+)((?:,HH)+)$"),
-        _canboat, frames=False),
-    Notation("YDWG", _pattern(r"(?:(\d\d):(\d\d):(\d\d\.\d+)\s+[RT]\s+)?(H{8})((?:\s+HH)+)$"),
-             _ydwg, DAY_NS),
-    Notation("Actisense", _pattern(
-        r"(?:A(\d\d)(\d\d)(\d\d\.\d+)\s+)?(H{5})\s+(H{5,6})\s+((?:HH)+)$"),
-             _actisense, DAY_NS, frames=False),
-    Notation("iKonvert", _pattern(r"!PDGY,(\d+),\d*,(\d+),\d*,(\d+(?:\.\d+)?),([A-Za-z0-9+/]+=*)$"),
-             _ikonvert, IKONVERT_NS, frames=False),
-)  # fmt: skip
-
-
 def lines_of(stream: Iterable[str]) -> Iterator[str]:
-    """Lines without the byte order mark and NULs that some loggers leave."""
-    for line in stream:
-        yield line.lstrip("\ufeff\0") if line[:1] in ("\ufeff", "\0") else line
+    """Lines without the byte order mark and NULs before the first one."""
+    rest = iter(stream)
+    first = next(rest, "")
+    return chain((first.lstrip("\ufeff\u00ef\u00bb\u00bf\0"),), rest)

@@ -10,15 +10,17 @@ from __future__ import annotations
 
 import re
 import struct
-from array import array
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 MAGIC = b"ULog\x01\x12\x35"
-HEADER_BYTES, HEAD_BYTES, FLAG_BYTES = 16, 3, 40
+HEADER_BYTES, HEAD_BYTES, FLAG_BYTES, NUMBER_BYTES = 16, 3, 40, 2
+SAMPLE = ord("D")
+BLOCK_BYTES = 4 << 20  # looked through at once
 SYNC = b"\x08\x00S\x2f\x73\x13\x20\x25\x0c\xbb\x12"  # a whole message, to begin again at
 TYPES = {
     "int8_t": "<i1", "uint8_t": "<u1", "int16_t": "<i2", "uint16_t": "<u2", "int32_t": "<i4",
@@ -56,18 +58,21 @@ def read_messages(path: Path, wanted: Collection[str]) -> ULog:
 
 
 class _Reader:
+    """Samples are most of a file: where one begins is seen by its type, its number and the length
+    of its format, for a block at once. Every other message is read by itself."""
+
     def __init__(self, data: bytes, wanted: frozenset[str]) -> None:
-        self.data, self.wanted = data, wanted
+        self.data, self.raw, self.wanted = data, np.frombuffer(data, np.uint8), wanted
         self.formats: dict[str, str] = {}
-        self.places: dict[int, array] = {}  # number of a subscription → where its samples begin
-        self.named: dict[int, tuple[str, int]] = {}
-        self.ended: list[tuple[tuple[str, int], array]] = []  # of numbers that were given again
+        self.named: dict[int, tuple[str, int]] = {}  # number of a subscription → what it is of
+        self.places: dict[tuple[str, int], list[np.ndarray]] = {}  # where samples begin
+        self.least = np.full(1 << 16, -1, np.int64)  # number → bytes of a sample, not padded
+        self.padded = np.full(1 << 16, -1, np.int64)
         self.found = ULog()
         if len(data) >= HEADER_BYTES:
             self.found.start_us = int.from_bytes(data[8:16], "little")
-        ends = self._appended()
         begin = HEADER_BYTES
-        for end in (*ends, len(data)):
+        for end in (*self._appended(), len(data)):
             self._messages(begin, end, last=end == len(data))
             begin = end
         self._tables()
@@ -84,32 +89,74 @@ class _Reader:
 
     def _messages(self, at: int, end: int, last: bool) -> None:
         """The messages from `at` on."""
-        data, places, found = self.data, self.places, self.found
-        count = 0
         while at + HEAD_BYTES <= end:
-            size, kind = data[at] | data[at + 1] << 8, data[at + 2]
-            after = at + HEAD_BYTES + size
-            if kind == 68 and after <= end:  # D
-                number = data[at + 3] | data[at + 4] << 8
-                if number in places:
-                    places[number].append(at + 5)
-                    places[number].append(size - 2)
-                count += 1
-                at = after
-                continue
-            if kind not in KINDS or after > end:
-                following = data.find(SYNC, at + 1, end)
-                if following < 0 and last and kind in KINDS:
-                    break  # the last message, cut off
-                if following >= 0 or last:
-                    found.skipped += (end if following < 0 else following) - at
-                at = end if following < 0 else following
-                continue
+            before = at
+            if self.data[at + 2] == SAMPLE:
+                at = self._samples(at, end, last)
+            if at == before:
+                at = self._one(at, end, last)
+                if at == before:
+                    break
+        self.found.cut += max(0, end - at) if last else 0
+
+    def _samples(self, at: int, end: int, last: bool) -> int:
+        """Samples from `at` on, and what stands between them, for a block; where it stopped."""
+        block = self.raw[at : min(end, at + BLOCK_BYTES)]
+        heads = np.flatnonzero(block[2:-2] == SAMPLE)
+        sizes = block[heads].astype(np.int64) | block[heads + 1].astype(np.int64) << 8
+        numbers = block[heads + 3].astype(np.int64) | block[heads + 4].astype(np.int64) << 8
+        known = (sizes == self.least[numbers]) | (sizes == self.padded[numbers])
+        heads, sizes, numbers = heads[known], sizes[known], numbers[known]
+        after = heads + HEAD_BYTES + sizes
+        nearest = np.searchsorted(heads, after)
+        leads = np.append(heads, -1)[nearest] == after  # to another sample
+        gaps = np.flatnonzero(~leads | (nearest != np.arange(len(heads)) + 1))
+        keep = np.zeros(len(heads), bool)
+        pos, k = 0, 0
+        while k < len(heads) and heads[k] == pos:
+            until = int(gaps[np.searchsorted(gaps, k)])
+            keep[k : until + 1] = True
+            pos, k = int(after[until]), int(nearest[until])
+            if pos > len(block):  # goes on in the next block, or is cut off
+                keep[until], pos = False, int(heads[until])
+                break
+            others = len(self.named)
+            while (
+                not leads[until]
+                and pos + HEAD_BYTES < len(block)
+                and (k >= len(heads) or heads[k] != pos)
+            ):
+                following = self._one(at + pos, end, last) - at
+                if following == pos or following > len(block) or len(self.named) != others:
+                    pos, k = following, len(heads)  # look for samples anew from there
+                    break
+                pos = following
+                k = int(np.searchsorted(heads, pos))
+        self.found.messages += int(keep.sum())
+        for number in np.flatnonzero(np.bincount(numbers[keep])).tolist():
+            if self.named[number][0] in self.wanted:
+                of = heads[keep & (numbers == number)] + at
+                self.places.setdefault(self.named[number], []).append(of)
+        return at + pos
+
+    def _one(self, at: int, end: int, last: bool) -> int:
+        """One message; where the next one begins, `at` itself where the last one is cut off."""
+        data = self.data
+        size, kind = data[at] | data[at + 1] << 8, data[at + 2]
+        after = at + HEAD_BYTES + size
+        if kind not in KINDS or after > end:
+            following = data.find(SYNC, at + 1, end)
+            if following < 0 and last and kind in KINDS:
+                return at
+            if following >= 0 or last:
+                self.found.skipped += (end if following < 0 else following) - at
+            return end if following < 0 else following
+        if kind == SAMPLE:  # of a format or number that nothing describes
+            self.found.skipped += after - at
+        else:
             self._other(kind, data[at + HEAD_BYTES : after])
-            count += 1
-            at = after
-        found.messages += count
-        found.cut += max(0, end - at) if last else 0
+            self.found.messages += 1
+        return after
 
     def _other(self, kind: int, body: bytes) -> None:
         """A message that is no sample."""
@@ -120,12 +167,11 @@ class _Reader:
         elif letter == "A" and len(body) > 3:
             number = int.from_bytes(body[1:3], "little")
             name = body[3:].decode("ascii", "replace")
-            if number in self.places:
-                self.ended.append((self.named[number], self.places[number]))
-                del self.places[number]
-            if name in self.wanted:
+            dtype = self._dtype(name)
+            if dtype is not None:
                 self.named[number] = name, body[0]
-                self.places[number] = array("q")
+                self.least[number] = _least(dtype) + NUMBER_BYTES
+                self.padded[number] = dtype.itemsize + NUMBER_BYTES
         elif letter == "P" and body:
             key = body[1 : 1 + body[0]].decode("ascii", "replace").split(" ")
             value = body[1 + body[0] : 5 + body[0]]
@@ -137,28 +183,20 @@ class _Reader:
 
     def _tables(self) -> None:
         """The samples of each topic and instance; several subscriptions of one are joined."""
-        raw = np.frombuffer(self.data, np.uint8)
-        parts: dict[tuple[str, int], list[np.ndarray]] = {}
-        known = [(self.named[number], at) for number, at in self.places.items()]
-        for key, at in (*self.ended, *known):
+        for key, several in self.places.items():
             dtype = self._dtype(key[0])
-            if dtype is None or not len(at):
-                continue
-            begin, size = np.array(at, np.int64).reshape(-1, 2).T
-            whole = size >= _least(dtype)  # padding at the end may be missing
-            rows = np.zeros(int(whole.sum()), dtype)
-            self.found.skipped += int(size[~whole].sum())
-            for length in np.unique(size[whole]).tolist():
-                same = size[whole] == length
-                taken = min(length, dtype.itemsize)
+            assert dtype is not None, key
+            begin = np.sort(np.concatenate(several))
+            size = self.raw[begin].astype(np.int64) | self.raw[begin + 1].astype(np.int64) << 8
+            rows = np.zeros(len(begin), dtype)
+            for length in np.flatnonzero(np.bincount(size)).tolist():
+                same = size == length
+                taken = min(length - NUMBER_BYTES, dtype.itemsize)
                 part = np.zeros((int(same.sum()), dtype.itemsize), np.uint8)
-                part[:, :taken] = raw[begin[whole][same][:, None] + np.arange(taken)]
+                first = begin[same] + HEAD_BYTES + NUMBER_BYTES
+                part[:, :taken] = sliding_window_view(self.raw, taken)[first]
                 rows[same] = part.view(dtype).reshape(-1)
-            parts.setdefault(key, []).append(rows)
-        for key, several in parts.items():
-            rows = np.concatenate(several)
-            order = np.argsort(rows["timestamp"], kind="stable")
-            self.found.topics[key] = rows[order]
+            self.found.topics[key] = rows[np.argsort(rows["timestamp"], kind="stable")]
 
     def _dtype(self, name: str) -> np.dtype | None:
         """Fields of a topic; None for one whose format is not there or that has no time."""
