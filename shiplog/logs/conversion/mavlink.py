@@ -38,6 +38,11 @@ DIALECT = "pymavlink.dialects.v20.ardupilotmega"
 RECEIVERS = ("GPS_RAW_INT", "GPS2_RAW")
 MOTION = ("ATTITUDE", "GLOBAL_POSITION_INT", *RECEIVERS)
 WANTED = frozenset({*MOTION, "SERVO_OUTPUT_RAW", "SYSTEM_TIME", "PARAM_VALUE", "WIND"})
+RECORD = {
+    "position": "GPS_RAW_INT",
+    "heading": "ATTITUDE",
+    "actuators": "SERVO_OUTPUT_RAW, and let the ground station read the parameters",
+}
 E7, CENTI, MILLI = 1e7, 100.0, 1000.0
 UNKNOWN_U16, NORTH = 65535, 36000  # none; a heading of 36000 cdeg is north, since 0 is none
 FIX_3D = 3
@@ -107,7 +112,7 @@ def read_telemetry(path: Path) -> Recording:
     findings += _said(found, systems)
     lost = _lost(found)
     findings += [Finding("truncated", "log", sentence) for sentence in lost]
-    return Recording(sorted(series, key=lambda one: one.topic), findings, lost)
+    return Recording(sorted(series, key=lambda one: one.topic), findings, lost, RECORD)
 
 
 FORMAT = Format("MAVLink telemetry logs", is_telemetry, one_log(read_telemetry), voyage=True)

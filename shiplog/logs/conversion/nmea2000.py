@@ -32,6 +32,11 @@ log = logging.getLogger(__name__)
 
 LOOKED_AT_BYTES, LOOKED_AT_LINES = 65_536, 200
 LINE_SHARE = 0.5  # of the first lines, that make a text such a log
+RECORD = {
+    "position": "129029 or 129025",
+    "heading": "127250",
+    "actuators": "127245 (rudder), 127488 (engine) and 127493 (gear)",
+}
 MOST_NAMED = 8
 
 
@@ -83,7 +88,7 @@ def read_bus_lines(
     for finding in findings:
         log.warning("%s: %s", name, finding.sentence)
     lost = [counted(bus.damaged, "damaged line") + "."] if bus.damaged else []
-    return Recording(series, findings, lost)
+    return Recording(series, findings, lost, RECORD)
 
 
 FORMAT = Format("NMEA 2000 logs", is_nmea2000, one_log(read_nmea2000), voyage=True)

@@ -35,6 +35,11 @@ WANTED = frozenset({
     *RECEIVERS, *RATES, "vehicle_attitude", "vehicle_local_position", "vehicle_global_position",
     "actuator_motors", "actuator_servos", "actuator_outputs",
 })  # fmt: skip
+RECORD = {
+    "position": "vehicle_gps_position",
+    "heading": "vehicle_attitude",
+    "actuators": "actuator_motors, or actuator_outputs until 1.12",
+}
 ANTENNA = ("EKF2_GPS_POS_X", "EKF2_GPS_POS_Y")  # m, ahead and to starboard of the autopilot
 
 
@@ -99,7 +104,7 @@ def read_ulog(path: Path) -> Recording:
         findings.append(Finding("dropped", "log", sentence, value=float(len(ulog.dropouts))))
     lost = _lost(ulog)
     findings += [Finding("truncated", "log", sentence) for sentence in lost]
-    return Recording(sorted(series, key=lambda one: one.topic), findings, lost)
+    return Recording(sorted(series, key=lambda one: one.topic), findings, lost, RECORD)
 
 
 FORMAT = Format("PX4 ULog files", is_ulog, one_log(read_ulog), voyage=True)
