@@ -17,7 +17,8 @@ def convert(
         list[Path],
         typer.Argument(
             help="CSV or Parquet tables, NMEA 0183 text, Signal K logs, folders of one of them per "
-            "topic or instrument, ROS bags."
+            "topic or instrument, ROS bags, ArduPilot DataFlash logs, MAVLink "
+            "telemetry logs, PX4 ULog files, NMEA 2000 logs."
         ),
     ],
     out: Annotated[Path, typer.Option(help="Folder for the logs.")],
@@ -31,7 +32,7 @@ def convert(
     ] = None,
     json_to: JsonOption = None,
 ) -> None:
-    """Tables, NMEA 0183 text, Signal K logs and ROS bags to MCAP logs.
+    """Recorders' files, tables, text and ROS bags to MCAP logs.
 
     Example: shiplog convert tables/*.parquet --profile esso-osaka --out logs
     """
