@@ -26,6 +26,7 @@ JUMP_S = 3.0
 JUMP_LENGTHS = 0.1
 JUMP_RAD = math.radians(30.0)
 UNSEEN_S = 10.0  # a ship of any size holds its rate of turn for a part of that
+ENDLESS = 1e300  # m: a position does not come round as a heading does
 MOST_STEPS = 2.0  # in which an instrument counts: a difference that rounding alone makes
 
 
@@ -128,7 +129,13 @@ def mark_jumps(grid: VoyageGrid, profile: Profile, sampled: dict[str, resampling
     found = []
     scale = held_values.METRE if profile.sensors.kind("position") == "geodetic" else 1.0
     of_position = ("position", "velocity", "heading")
-    steps = _jumps(grid, sampled, of_position, position, over_ground, scale=scale)
+    if profile.sensors.velocity is None:  # derived from the position, and torn where it is
+        for row, step in _torn(grid, sampled["position"], scale):
+            grid.marks[row] |= int(Quality.JUMP)
+            found.append(_jump("position", row, step, "m", math.inf, "the samples around it"))
+        steps = []
+    else:
+        steps = _jumps(grid, sampled, of_position, position, over_ground, scale=scale)
     for row, step in steps:
         lost = _worth(step, over_ground[row])
         if lost > JUMP_S and step > JUMP_LENGTHS * profile.ship.length_m:
@@ -214,6 +221,21 @@ def _steps(grid: VoyageGrid, samples: resampling.Samples) -> list[tuple[int, flo
     found = fault_detection.steps(samples.value[sound, 0], samples.noise, 2.0 * math.pi)
     rows = [(int(np.searchsorted(grid.times, time[at])), step) for at, step in found]
     return [(row, step) for row, step in rows if 0 < row < len(grid.times)]
+
+
+def _torn(grid: VoyageGrid, samples: resampling.Samples, scale: float) -> list[tuple[int, float]]:
+    """Rows and sizes [m] of the steps of a position whose velocity nobody measured; scale: m of
+    one unit of it."""
+    sound = ~samples.spike
+    time, value = samples.time[sound], samples.value[sound] * scale
+    if scale != 1.0 and len(value):  # degrees: those of longitude are shorter
+        value = value * np.array([1.0, math.cos(math.radians(float(samples.value[0, 0])))])
+    sizes: dict[int, float] = {}
+    for part in value.T:
+        for at, step in fault_detection.steps(part, samples.noise, ENDLESS):
+            sizes[at] = math.hypot(sizes.get(at, 0.0), step)
+    rows = [(int(np.searchsorted(grid.times, time[at])), step) for at, step in sizes.items()]
+    return sorted((row, step) for row, step in rows if 0 < row < len(grid.times))
 
 
 def _far(name: str, size: float) -> str:
