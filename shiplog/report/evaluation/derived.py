@@ -7,7 +7,6 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from shiplog.exceptions import listed
 from shiplog.logs.health.health_report import DerivedChannel, VoyageReport
 from shiplog.nomenclature import units
 from shiplog.nomenclature.channels import VELOCITY
@@ -81,4 +80,6 @@ def loss_sentence(derived: Sequence[DerivedChannel], seconds: float) -> str:
 
 
 def _words(names: Iterable[str]) -> str:
-    return listed([name.replace("_", " ") for name in names])
+    """In their order: "surge, sway and yaw rate"."""
+    *most, last = (name.replace("_", " ") for name in names)
+    return f"{', '.join(most)} and {last}" if most else last

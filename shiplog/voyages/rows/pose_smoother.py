@@ -40,7 +40,7 @@ PIECE = 600  # of them in a row: long against the time that a smoother remembers
 FEWEST = 8  # samples of which a velocity is derived: a state has three numbers
 FIRST = 3  # innovations of a piece that say where it begins, and not how it goes on
 SETTLED = 1e-10  # relative change of a covariance from which it is taken to have settled
-SAME_STEP = 1e-3  # of a period: steps so nearly alike have one covariance
+SAME_STEP = 1e-3  # of a period: steps so nearly alike leave a settled covariance as it is
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def smooth(time: np.ndarray, value: np.ndarray, starts: np.ndarray) -> list[Smoo
     if not pieces:
         return []
     period = float(np.median(np.concatenate([np.diff(time[a:b]) for a, b in pieces])))
-    scaled = [(_steps(time[a:b] / period), value[a:b]) for a, b in pieces]
+    scaled = [(np.diff(time[a:b]) / period, value[a:b]) for a, b in pieces]
     ratio, sigma = most_probable(scaled)
     found = []
     unit = sigma / np.array([1.0, period, period**2])
@@ -112,11 +112,6 @@ def smooth(time: np.ndarray, value: np.ndarray, starts: np.ndarray) -> list[Smoo
         jerk = math.sqrt(ratio / period**5) * sigma
         found.append(Smoothed(time[a:b], state, deviation * unit[:2], sigma, jerk))
     return found
-
-
-def _steps(time: np.ndarray) -> np.ndarray:
-    """[n - 1] in periods; those as good as alike are alike, so that their matrices are."""
-    return np.maximum(np.round(np.diff(time) / SAME_STEP), 1.0) * SAME_STEP
 
 
 def most_probable(pieces: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[float, float]:
@@ -199,7 +194,7 @@ def _filtered(steps: np.ndarray, values: np.ndarray, ratio: float) -> _Forward:
     k1 = k2 = k3 = s = 0.0
     prior = covariances[0]
     for k, t in enumerate(steps.tolist(), 1):
-        if not (settled and t == last):
+        if not (settled and abs(t - last) <= SAME_STEP):
             h = 0.5 * t * t
             # F P Fᵀ + Q
             pa = C + t * E + h * H
@@ -219,7 +214,7 @@ def _filtered(steps: np.ndarray, values: np.ndarray, ratio: float) -> _Forward:
             D = prior[3] - k2 * prior[1]
             E = prior[4] - k2 * prior[2]
             H = prior[5] - k3 * prior[2]
-            settled = t == last and abs(D - old) <= SETTLED * D
+            settled = abs(t - last) <= SAME_STEP and abs(D - old) <= SETTLED * D
             last = t
         p, v = p + t * v + 0.5 * t * t * a, v + t * a
         before.append((p, v, a))
