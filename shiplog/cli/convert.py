@@ -17,7 +17,7 @@ def convert(
         list[Path],
         typer.Argument(
             help="CSV or Parquet tables, NMEA 0183 text, Signal K logs, folders of one of them per "
-            "topic or instrument, ROS bags."
+            "topic or instrument, ROS bags, ArduPilot DataFlash logs."
         ),
     ],
     out: Annotated[Path, typer.Option(help="Folder for the logs.")],

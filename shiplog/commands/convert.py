@@ -119,6 +119,9 @@ def draft(path: Path, vessel: str | None = None) -> str:
         if formats.recognise(source) is table_rows.FORMAT:
             table_rows.refuse_others(source)
             return draft_table(source, vessel)
+        if recorded := _recorded(source):
+            log.info("%s: drafted from %s", path.name, recorded[0].name)
+            return draft(recorded[0], vessel)
         found = look_into(source) if source.is_dir() and not is_bag(source) else Folder()
         if found.trips:
             log.info(
@@ -131,7 +134,7 @@ def draft(path: Path, vessel: str | None = None) -> str:
             done = Converted()
             times = dict([found.clock] if found.clock else [])
             (target,) = _each(source, None, folder, done, times)
-            text = draft_log(target, vessel)
+            text = draft_log(target, vessel, path.name)
         for what in done.lost.values():
             log.warning("%s: left out: %s", path.name, what)
         return recognised(text, path, tuple(done.lost.values())) + clock_section(found.clock)
@@ -155,8 +158,12 @@ def _each(
     path: Path, profile: Profile | None, out: Path, done: Converted,
     times: Mapping[str, Column] | None = None,
 ) -> Iterator[Path]:  # fmt: skip
-    check_there(path, "a table, NMEA 0183 text, a ROS bag, or a folder of one table per topic")
+    check_there(path, "a recorder's file, a table, a ROS bag, or a folder of one table per topic")
     with packed.unpacked(path) as source:
+        if recorded := _recorded(source):
+            for file in recorded:
+                yield from _each(file, profile, out, done)
+            return
         tables = profile is not None and source.is_dir() and not is_bag(source)
         trips = look_into(source).trips if tables else ()
         for table in trips:
@@ -164,3 +171,8 @@ def _each(
         if not trips:
             one = Original(source, path, profile, out, done.refused, done.lost, times)
             yield from formats.recognise(source).logs(one)
+
+
+def _recorded(source: Path) -> list[Path]:
+    """The recorders' files of a folder, each a voyage."""
+    return formats.voyages_in(source) if source.is_dir() and not is_bag(source) else []

@@ -12,6 +12,7 @@ import polars as pl
 from shiplog.commands.bars import tracked
 from shiplog.commands.convert import Converted, as_logs
 from shiplog.exceptions import ShiplogError
+from shiplog.logs.conversion import formats
 from shiplog.logs.conversion.bags import MCAP, bags_once, is_bag, only_log
 from shiplog.logs.health import health_report
 from shiplog.logs.health.health_report import Finding, NotCompared, VoyageReport
@@ -175,14 +176,14 @@ def _as_said(error: BaseException, path: Path) -> ShiplogError:
 
 
 def expand(paths: Iterable[Path]) -> list[Path]:
-    """Folders stand for the logs in them, but for hidden files; a bag of one log for this log, and
-    one of several parts, or a folder of tables, for itself."""
+    """Folders stand for the logs and recorders' files in them, but for hidden files; a bag of one
+    log for this log, and one of several parts, or a folder of tables, for itself."""
     found: list[Path] = []
     for path in bags_once(paths):
         alone = only_log(path) if is_bag(path) else None
         logs = [] if is_bag(path) or not path.is_dir() else sorted(
             p for p in path.glob("[!.]*") if MCAP in p.suffixes[-2:] and p.is_file()
-        )  # fmt: skip
+        ) + formats.voyages_in(path)  # fmt: skip
         found += [alone] if alone else logs or [path]
     return found
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -46,6 +46,11 @@ class Log:
             )
         self.leaves = _of_one_vessel(leaves, vessel, self.contents)
         self.data: dict[str, pl.DataFrame] = {}
+
+    def said(self, topic: str) -> Mapping[str, str]:
+        """The metadata of a topic's channel."""
+        found = self.contents.topics.get(topic)
+        return found.metadata if found else {}
 
     def look(self, wanted: dict[str, set[str]]) -> None:
         """Read the topics of the draft that were not read yet."""

@@ -10,6 +10,11 @@ SHIP = (
     "# draught_m = 0.0  # CHECK: likewise\n"
     "# mass_kg = 0.0  # CHECK: estimated of length, breadth and draught where left out\n"
 )
+STATED = (  # of a recorder that says all else: what is left to fill in
+    "length_m = 1.0  # CHECK: the {what} does not say; between perpendiculars\n"
+    "# breadth_m = 0.0  # CHECK: estimated of the length where left out\n"
+    "# draught_m and mass_kg are estimated of length and breadth where they are left out\n"
+)
 PLACE = "position_m = [0.0, 0.0]  # CHECK: ahead and to starboard of midship\n"
 DIMENSIONS = {  # of an actuator, which only physical models ask for
     "rudder": "# area_m2 = 0.0  # CHECK: estimated by train --model mmg where left out\n"

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from shiplog.drafting import accuracy, facts, guesses, particulars, words
+from shiplog.drafting import accuracy, facts, guesses, particulars, stated, words
 from shiplog.drafting.guesses import ACTUATOR_TOPICS, GUESSES
 from shiplog.drafting.log_content import Choice, Log
 from shiplog.drafting.toml_text import in_comment, quoted
@@ -23,10 +23,11 @@ LOOKED_AT = 8  # of the topics that may hold a channel: the first of them with d
 OPTIONAL = ("velocity", "yaw_rate", "wind")  # left out where no topic holds a value
 
 
-def draft(path: str | Path, vessel: str | None = None) -> str:
+def draft(path: str | Path, vessel: str | None = None, given: str | None = None) -> str:
     """TOML text of a profile for this log.
 
     vessel  the MMSI of the ship, where the log is of many
+    given   the name of the file that the log was made of, if it was
 
     Raises LogUnreadable where it has no field at all, ProfileError where it is of many ships.
     """
@@ -43,9 +44,11 @@ def draft(path: str | Path, vessel: str | None = None) -> str:
         for name, found in choices.items()
     }
     choices = {name: log.liveliest(found) for name, found in choices.items()}
+    for found in choices.values():  # the recorder's own word counts most
+        found.sort(key=lambda one: not stated.is_primary(log.said(one.topic)))
     best = [found[0] for found in choices.values() if found]
     driven = _actuators(log, {choice.topic for choice in best})
-    parts = [_ship(log.contents)]
+    parts = [_ship(log.contents, given, any(stated.actuator(log.said(one[1])) for one in driven))]
     agreement = Agreement()
     sections = {
         name: _sensor(name, choices[name], log, agreement)
@@ -66,6 +69,7 @@ def draft(path: str | Path, vessel: str | None = None) -> str:
     return "\n".join(parts)
 
 
+LEVER_ARM = "lever_arm_m = [0.0, 0.0]  # CHECK: antenna ahead and to starboard of midship"
 IN_TURN = ("position", "heading", "velocity", "yaw_rate", "wind")  # each goes by those before it
 NO_ACTUATOR = (
     "# No actuator was recognised: the log can be ingested and its sensors checked, but no model\n"
@@ -82,11 +86,13 @@ def _fields_of(choices: Iterable[Choice]) -> dict[str, set[str]]:
     return wanted
 
 
-def _ship(found: Contents) -> str:
+def _ship(found: Contents, given: str | None, by_recorder: bool) -> str:
     name = found.metadata.get("voyage", {}).get("ship") or found.path.stem
     return (
-        f"# Drafted from {in_comment(found.path.name)}. Look over every line that says CHECK.\n\n"
-        f"[ship]\nname = {quoted(name)}\n" + particulars.SHIP.format(what="log")
+        f"# Drafted from {in_comment(given or found.path.name)}. "
+        "Look over every line that says CHECK.\n\n"
+        f"[ship]\nname = {quoted(name)}\n"
+        + (particulars.STATED if by_recorder else particulars.SHIP).format(what="log")
     )
 
 
@@ -178,13 +184,14 @@ def _section(name: str, choice: Choice, log: Log, agreement: Agreement) -> str:
         factor, _ = facts.scale_of_coordinates(*numbers)
         lines += facts.of_coordinates(*numbers)
     if name in ("position", "velocity"):
-        lines.append("lever_arm_m = [0.0, 0.0]  # CHECK: antenna ahead and to starboard of midship")
+        lines.append(stated.lever_arm(log.said(topic)) or LEVER_ARM)
     if name == "position":
         agreement.position(found, factor)
     elif name == "heading":
         agreement.heading(found, drafted.units[0], signs[0])
-    lines += accuracy.lines(name, kind, log.times(topic), _si(found, drafted, factor),
-                            list(drafted.units))  # fmt: skip
+    accurate = accuracy.lines(name, kind, log.times(topic), _si(found, drafted, factor),
+                              list(drafted.units))  # fmt: skip
+    lines += stated.sigma(log.said(topic), accurate)
     return "\n".join(lines) + "\n"
 
 
@@ -233,7 +240,10 @@ def _doubt(name: str, topic: str, paths: Sequence[str]) -> str:
 
 
 def _actuators(log: Log, used: set[str]) -> list[tuple[str, str, str, str]]:
-    """Kind, topic, field and fallback unit of each; orders only of a kind that nobody measured."""
+    """Kind, topic, field and fallback unit of each: those that the recorder itself states, else by
+    their names, and orders only of a kind that nobody measured."""
+    if known := _stated(log):
+        return known
     found: dict[str, tuple[str, str, str, str]] = {}
     for kind, _, _, fallback in ACTUATOR_TOPICS:
         for topic, columns in sorted(log.leaves.items()):
@@ -258,6 +268,16 @@ def _actuators(log: Log, used: set[str]) -> list[tuple[str, str, str, str]]:
     return chosen
 
 
+def _stated(log: Log) -> list[tuple[str, str, str, str]]:
+    """The actuators that the log itself says are some."""
+    known = [
+        (kind, topic, stated.field(columns), "1") for topic, columns in sorted(log.leaves.items())
+        if (kind := stated.actuator(log.said(topic)))
+    ]  # fmt: skip
+    log.look({topic: {path} for _, topic, path, _ in known})
+    return [one for one in known if log.drives(one[1], one[2])]
+
+
 def _actuator(kind: str, topic: str, path: str, fallback: str, names: set[str], *, log: Log) -> str:
     unit = log.unit((path,), 0, topic, DRIVEN[kind])
     check = "" if unit else "  # CHECK: the log does not say"
@@ -266,18 +286,22 @@ def _actuator(kind: str, topic: str, path: str, fallback: str, names: set[str], 
         fallback, size = particulars.unit_by_size(path, most)
         check += f"; {size}" if size else ""
     ordered = "CHECK: a set-point, what was ordered; " if words.is_set_point(topic) else ""
+    said = log.said(topic)
     name = re.sub(r"\W+", "_", topic, flags=re.ASCII).strip("_").lower() or kind
     if name[:1].isdigit():
         name = f"{kind}_{name}"
     while name in names:  # topics that differ in other letters than a column's name has
         name += "_2"
     names.add(name)
+    rest = (
+        stated.actuator_lines(said, kind, unit or fallback, most) if stated.actuator(said)
+        else particulars.of_actuator(kind, unit or fallback, most)
+    )  # fmt: skip
     return (
         f'[[actuators]]\nname = "{name}"\nkind = "{kind}"\n'
-        f"topic = {quoted(topic)}  # {ordered}{log.rate(topic)}\n"
+        f"topic = {quoted(topic)}  # {ordered}{stated.comment(said)}{log.rate(topic)}\n"
         f'field = {quoted(path)}  # {log.values(topic, path)}\nunit = "{unit or fallback}"{check}\n'
-        f"{log.describe_change(topic, path)}"
-        f"{particulars.of_actuator(kind, unit or fallback, most)}"
+        f"{log.describe_change(topic, path)}{rest}"
     )
 
 

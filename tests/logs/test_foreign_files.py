@@ -29,7 +29,6 @@ def zipped(**files: str | bytes) -> bytes:
 
 PACKET = struct.pack(">Q", 1_659_169_701_507_935) + b"\xfd\x09\x00\x00\x01\x01\x01\x00\x00\x00"
 FILES = {  # what it is called, what is in it → what it is, and the tool that helps
-    "00000012.BIN": (b"\xa3\x95\x80\x80\x59FMT" + bytes(90), "DataFlash", "mavlogdump.py"),
     "2021.log": (b"FMT, 128, 89, FMT, BBnNZ, Type,Length\n" * 9, "DataFlash", "mavlogdump.py"),
     "flight.tlog": (PACKET * 9, "MAVLink telemetry", "mavlogdump.py"),
     "flight.ulg": (b"ULog\x01\x12\x35\x01" + bytes(90), "ULog", "ulog2csv"),

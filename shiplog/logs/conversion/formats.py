@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from shiplog.logs.conversion import bags, copies, nmea, nmea_folder, signalk, table_rows
+from shiplog.logs.conversion import (
+    bags,
+    copies,
+    dataflash,
+    nmea,
+    nmea_folder,
+    signalk,
+    table_rows,
+)
 from shiplog.logs.conversion.original import Format
 from shiplog.ship_profile.profile import Profile
 
@@ -12,6 +20,7 @@ FORMATS = (
     bags.FORMAT,
     nmea_folder.FORMAT,
     copies.FORMAT,
+    dataflash.FORMAT,
     signalk.FORMAT,
     nmea.FORMAT,
     table_rows.FORMAT,  # takes what is left
@@ -25,3 +34,10 @@ def recognise(path: Path) -> Format:
 def convertible(path: Path, profile: Profile | None) -> bool:
     """Whether logs can be made of it; the reader of logs says what is wrong with the others."""
     return recognise(path).sure(path, profile)
+
+
+def voyages_in(folder: Path) -> list[Path]:
+    """The files of a folder that recorders wrote, each a voyage, in the order of their names."""
+    files = sorted(path for path in folder.glob("[!.]*") if path.is_file())
+    recorders = [one for one in FORMATS if one.voyage]
+    return [path for path in files if any(one.takes(path) for one in recorders)]

@@ -85,12 +85,14 @@ class Format:
     logs   writes the logs of an original
     sure   whether logs can be made of a path that `takes` accepts, as far as a look says; and with
            a profile or without. Unless given, always
+    voyage whether each file is a voyage by itself: a folder stands for all such files in it
     """
 
     name: str
     takes: Callable[[Path], bool]
     logs: Callable[[Original], Iterator[Path]]
     sure: Callable[[Path, Profile | None], bool] = lambda path, profile: True
+    voyage: bool = False
 
 
 def why(error: BaseException, doing: str) -> str:

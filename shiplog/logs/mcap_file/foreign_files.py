@@ -113,8 +113,7 @@ def _canboat(tool: str) -> str:
 
 
 KINDS = (
-    Kind("an ArduPilot DataFlash log", MAVLINK_WAY, _begins(b"\xa3\x95")),
-    Kind("an ArduPilot DataFlash log", MAVLINK_WAY, _text(r"^FMT, ?128, ?89, ?FMT")),
+    Kind("an ArduPilot DataFlash log as text", MAVLINK_WAY, _text(r"^FMT, ?128, ?89, ?FMT")),
     Kind("a MAVLink telemetry log", MAVLINK_WAY, _telemetry),
     Kind("a PX4 ULog", "make tables of it, one a topic, with ulog2csv of the Python package "
          "pyulog: ulog2csv -o {stem} {file}; " + FOLDER, _begins(b"ULog\x01\x12\x35")),
