@@ -31,7 +31,7 @@ _FOREIGN = re.compile(  # units of forces, powers, pressures, flows: of no chann
 _EDGE = r"(?:^|[/_.\s\-])"
 _SET_POINT = re.compile(
     _EDGE + r"(reference|ref|cmd|command|commanded|desired|des|guidance|set_?point|sp|target|"
-    r"order|ordered|waypoint|goal)(?=[/_.\s\-\d]|$)",
+    r"order|ordered|waypoint|goal|set)(?=[/_.\s\-\d]|$)",
     re.IGNORECASE,
 )
 _ESTIMATE = re.compile(

@@ -21,6 +21,8 @@ FORMATS = (
     nmea_folder.FORMAT,
     copies.FORMAT,
     dataflash.FORMAT,
+    table_rows.MATLAB,
+    table_rows.EXCEL,
     signalk.FORMAT,
     nmea.FORMAT,
     table_rows.FORMAT,  # takes what is left

@@ -117,15 +117,11 @@ KINDS = (
     Kind("a MAVLink telemetry log", MAVLINK_WAY, _telemetry),
     Kind("a PX4 ULog", "make tables of it, one a topic, with ulog2csv of the Python package "
          "pyulog: ulog2csv -o {stem} {file}; " + FOLDER, _begins(b"ULog\x01\x12\x35")),
-    Kind("a MATLAB file", "write its variables as a table, in MATLAB with writetable or in Python "
-         "with scipy.io.loadmat; " + TABLE,
-         _begins(b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file")),
     Kind("an HDF5 file", "write its series as a table, in Python with h5py; " + TABLE,
          _begins(b"\x89HDF\r\n\x1a\n")),
     Kind("a NetCDF file", "write its variables as a table, in Python with xarray: "
          "xarray.open_dataset(...).to_dataframe().to_csv(...); " + TABLE,
          _begins(b"CDF\x01", b"CDF\x02", b"CDF\x05")),
-    Kind("an Excel workbook", SPREADSHEET_WAY, _zip_of("xl/")),
     Kind("an Office document of the old kind", SPREADSHEET_WAY,
          _begins(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1")),
     Kind("an OpenDocument file", SPREADSHEET_WAY, _zip_of("mimetype")),
