@@ -34,9 +34,8 @@ def workbook(path, **options):
     lasting = book.add_format({"num_format": "[h]:mm:ss"})
     sheet.write_string(0, 0, "Trial of 3 May")
     names = ("When", "Clock", "Lat", "Steps", "Mixed", "On", "Lasted", "Comma")
-    for place, (name, unit) in enumerate(
-        zip(names, ("", "", "deg", "rpm", "", "", "", ""), strict=False)
-    ):
+    units = {"Lat": "deg", "Steps": "rpm"}
+    for place, name in enumerate(names):
         sheet.write_string(2, place, name)
         sheet.write_string(3, place, units.get(name, ""))
     for row in range(ROWS):
