@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,6 +36,9 @@ from shiplog.voyages.rows.pose_smoother import Smoothed, smooth
 from shiplog.voyages.rows.resampling import Samples
 
 WORST = 3.0  # times the median standard deviation: a velocity less sure than that is none
+ENDLESS = 1e300  # m: a position does not come round as a heading does
+USUAL = 0.95  # quantile of the speeds: a ship mostly goes no faster,
+UNSEEN = 2.0  # and no more than so many times as far as that while nobody measures
 MEAN_S = 1.0  # s, over which the rows of a window are averaged
 
 
@@ -105,9 +108,10 @@ def _rate(
     """Of a source's samples, value [n], complex where it is a position; `period`: a full turn;
     `stated`: its accuracy in the profile, 0 where none is."""
     own = _own(samples)
-    at, value, noise = samples.time[own], value[own], samples.noise
+    kept = replace(samples, time=samples.time[own], value=samples.value[own])
+    at, value = kept.time, value[own]
     starts = np.diff(at, prepend=at[:1]) > samples.longest_s * 1e9 if len(at) else own
-    for step in _torn(value, noise, period):
+    for step in torn(kept, value, period):
         starts[step] = True
     if len(starts):
         starts[0] = True
@@ -122,13 +126,26 @@ def _own(samples: Samples) -> np.ndarray:
     return own[~samples.spike[own]]
 
 
-def _torn(value: np.ndarray, noise: float, period: float | None) -> list[int]:
-    """Samples at which a source steps to stay there: nothing is smoothed across."""
-    if period is not None:
-        return [at for at, _ in fault_detection.steps(value, noise, period)]
-    endless = 1e300  # a position does not come round
-    both = (fault_detection.steps(part, noise, endless) for part in (value.real, value.imag))
-    return sorted({at for part in both for at, _ in part})
+def torn(samples: Samples, value: np.ndarray, period: float | None) -> dict[int, float]:
+    """Samples at which a source steps to stay there, and by how much: nothing is smoothed across.
+    Not where nothing was measured before one, and the ship can have gone as far meanwhile.
+
+    value   [n], complex where it is a position; `period`: a full turn
+    """
+    parts = (value.real, value.imag) if np.iscomplexobj(value) else (value,)
+    found: dict[int, float] = {}
+    for part in parts:
+        for at, step in fault_detection.steps(part, samples.noise, period or ENDLESS):
+            found[at] = math.hypot(found.get(at, 0.0), step)
+    if not found:
+        return {}
+    apart = np.diff(samples.time) * 1e-9
+    mostly = float(np.quantile(np.abs(np.diff(value)) / apart, USUAL))
+    alone = noise_estimate.WHOLE_PERIODS * samples.period_s
+    return {
+        at: step for at, step in found.items()
+        if apart[at - 1] <= alone or step > UNSEEN * apart[at - 1] * mostly
+    }  # fmt: skip
 
 
 def _on_grid(

@@ -8,18 +8,19 @@ has moved once the next one comes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import polars as pl
 
 from shiplog.logs.reading.read import Reading
-from shiplog.ship_profile.profile import Profile
+from shiplog.ship_profile.profile import Profile, Sensor
 from shiplog.voyages.clocks import clocks
 from shiplog.voyages.rows import fault_detection, noise_estimate
 from shiplog.voyages.rows.left_out import LeftOut
 
+ZERO, AGAIN = "zero in every field", "the pose before it again, to the last digit"
 CAUGHT_UP = 1.5  # times the step after the next sample: a pose that stood still has more to go
 LEAST = 0.5  # of the record's usual step: less is no motion
 COUNTED = 2.5  # steps in which an instrument counts: rounding alone leaves one or two
@@ -31,29 +32,50 @@ def blanked(reading: Reading, profile: Profile) -> tuple[Reading, list[LeftOut]]
     derived: with a measured velocity `held_values` compares the two."""
     if profile.sensors.velocity is not None:
         return reading, []
-    frames, left = dict(reading.frames), []
-    named = {"position": profile.sensors.position, "heading": profile.sensors.heading}
-    together = named["position"].topic == named["heading"].topic
-    groups = [("position", "heading")] if together else [("position",), ("heading",)]
-    for group in groups:
-        sources = [named[name] for name in group]
-        frame = frames.get(sources[0].topic)
-        if frame is None or frame.height == 0:
-            continue
-        paths = [path for source in sources for path in source.paths]
-        raw = _numbers(frame, paths)
-        lost = {"zero in every field": _zeros(raw)} if together else {}
-        gone = next(iter(lost.values()), np.zeros(len(raw), bool))
-        lost["the pose before it again, to the last digit"] = _again(raw, gone)
-        times = frame[clocks.clock_columns(frame, sources[0])[0]].fill_null(0).to_numpy()
-        for what, bad in lost.items():
-            if bad.any():
-                left += [_left_out(name, what, times[bad], len(raw)) for name in group]
-        every = np.logical_or.reduce(list(lost.values()))
-        if every.any():
-            nothing = [pl.when(pl.lit(~every)).then(pl.col(p)).alias(p) for p in paths]
-            frames[sources[0].topic] = frame.with_columns(nothing)
+    frames = dict(reading.frames)
+    sources = [profile.sensors.position, profile.sensors.heading]
+    parts = {
+        name: _Part.of(frames[one.topic], one)
+        for name, one in zip(("position", "heading"), sources, strict=True)
+        if one.topic in frames and frames[one.topic].height
+    }
+    left: list[LeftOut] = []
+    for names in _together(parts):
+        raw = np.concatenate([parts[name].raw for name in names], axis=1)
+        zero = _zeros(raw) if len(names) > 1 else np.zeros(len(raw), bool)
+        again = _again(raw, zero)
+        for name in names:
+            part, topic = parts[name], parts[name].topic
+            left += [
+                _left_out(name, what, part.times[lost], len(raw))
+                for what, lost in ((ZERO, zero), (AGAIN, again)) if lost.any()
+            ]  # fmt: skip
+            sound = pl.lit(~(zero | again))
+            nothing = [pl.when(sound).then(pl.col(path)).alias(path) for path in part.paths]
+            frames[topic] = frames[topic].with_columns(nothing)
     return replace(reading, frames=frames), left
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One source's numbers [n, k] as they were sent, and their times [n] ns."""
+
+    topic: str
+    paths: tuple[str, ...]
+    times: np.ndarray
+    raw: np.ndarray
+
+    @classmethod
+    def of(cls, frame: pl.DataFrame, source: Sensor) -> _Part:
+        times = frame[clocks.clock_columns(frame, source)[0]].fill_null(0).to_numpy()
+        return cls(source.topic, source.paths, times, _numbers(frame, source.paths))
+
+
+def _together(parts: Mapping[str, _Part]) -> list[tuple[str, ...]]:
+    """Sources that were written at once, by their stamps: one instrument's, and told together."""
+    if len(parts) == 2 and np.array_equal(*(part.times for part in parts.values())):
+        return [tuple(parts)]
+    return [(name,) for name in parts]
 
 
 def _numbers(frame: pl.DataFrame, paths: Sequence[str]) -> np.ndarray:
