@@ -76,7 +76,7 @@ def parted(name: str) -> str:
 
 def is_set_point(name: str) -> bool:
     """Whether a topic or column says what was ordered and not what was measured."""
-    return bool(_SET_POINT.search(name))
+    return bool(_SET_POINT.search(name) or _SET_POINT.search(parted(name)))
 
 
 def is_derived(name: str) -> bool:
