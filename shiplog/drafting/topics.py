@@ -71,6 +71,7 @@ def draft(path: str | Path, vessel: str | None = None, given: str | None = None)
 
 LEVER_ARM = "lever_arm_m = [0.0, 0.0]  # CHECK: antenna ahead and to starboard of midship"
 IN_TURN = ("position", "heading", "velocity", "yaw_rate", "wind")  # each goes by those before it
+NEEDED = "a voyage needs it: record it, or name its topic here"
 NO_ACTUATOR = (
     "# No actuator was recognised: the log can be ingested and its sensors checked, but no model\n"
     "# trained. Each actuator needs a section like this one:\n"
@@ -130,8 +131,8 @@ def _receiver(positions: list[Choice]) -> str:
 
 def _sensor(name: str, choices: list[Choice], log: Log, agreement: Agreement) -> str:
     if not choices:
-        does = "; shiplog does without it" if name in OPTIONAL else ""
-        return f"# No {name} was recognised{does}.\n"
+        does = "shiplog does without it" if name in OPTIONAL else NEEDED
+        return f"# No {name} was recognised; {does}.\n"
     text = _section(name, choices[0], log, agreement)
     for second in choices[1:2]:
         kind, _ = guesses.kind_of(second.guess, second.topic)

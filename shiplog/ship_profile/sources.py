@@ -272,6 +272,10 @@ class Actuator(Source):
     diameter_m: Length | None = Field(
         default=None, description="of a propeller, m; needed for `mmg` and `hybrid`"
     )
+    gear_ratio: float | None = Field(
+        default=None, ge=0.1, le=100.0, description="of a propeller whose value is its engine's "
+        "speed: turns of the engine a turn of the propeller"
+    )  # fmt: skip
     area_m2: Area | None = Field(
         default=None, description="of a rudder, m²; estimated where left out"
     )
@@ -282,7 +286,17 @@ class Actuator(Source):
     @model_validator(mode="after")
     def _limited(self) -> Actuator:
         _require_order(self.limits)
+        turns = self.kind in ("propeller", "thruster")
+        if self.gear_ratio is not None and not turns:
+            raise ValueError(
+                f"`gear_ratio` is of a propeller or thruster, and this is a {self.kind}"
+            )
         return self
+
+    def scale(self) -> list[tuple[float, float]]:
+        """(offset, factor) per field; behind a gear the propeller turns slower than its engine."""
+        slower = self.gear_ratio or 1.0
+        return [(offset, factor / slower) for offset, factor in super().scale()]
 
     @property
     def si_limits(self) -> tuple[float, float] | None:

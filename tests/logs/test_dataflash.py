@@ -373,6 +373,21 @@ def test_right_pulses_are_kept_as_they_are(trip):
     assert BOOT_S > 0 and BLUEBOAT["SERVO3_REVERSED"] == 1
 
 
+def test_what_a_log_lacks_is_said_with_what_to_record(tmp_path):
+    """A receiver alone: it can be checked, and that is all."""
+    week, ms = gps_time(START)
+    data = header(("GPS",))
+    for i in range(50):
+        data += record("GPS", 200_000 * i, 0, 3, ms + 200 * i, week, 9, 65, 560_000_000 + 9 * i,
+                       120_000_000, 0, 1.0, 5.0, 0.0, 0.0, 1)  # fmt: skip
+    (tmp_path / "alone.BIN").write_bytes(data)
+    done = check_logs([tmp_path / "alone.BIN"])
+    said = {one.channel: one.sentence for one in done.reports[0].findings}
+    assert done.complete and "no voyage made of it" in said["heading"] and "ATT" in said["heading"]
+    assert "no model trained" in said["actuators"] and "SERVOn_FUNCTION" in said["actuators"]
+    assert "No heading was recognised; a voyage needs it" in draft(tmp_path / "alone.BIN")
+
+
 # --- damage -------------------------------------------------------------------------------------
 
 

@@ -37,6 +37,10 @@ WANTED = frozenset({
     *SECONDS, *(name for names in SECONDS.values() for name in names), *EKF, *CORES, *PULSES,
     "ATT", "POS", "WIND", "PARM", "ESC",
 })  # fmt: skip
+RECORD = {  # what LOG_BITMASK has to hold
+    "position": "GPS", "heading": "ATT",
+    "actuators": "RCOU, and the parameters SERVOn_FUNCTION (PARM)",
+}  # fmt: skip
 FIX_3D = 3  # GPS.Status from which position and time are the receiver's
 POSITION_KEYS = (
     "GPS{n}_POS_{axis}",
@@ -75,7 +79,7 @@ def read_dataflash(path: Path) -> Recording:
     findings = clock.findings(path.name) + _of_status(fixes)
     lost = _lost(flash)
     findings += [Finding("truncated", "log", sentence) for sentence in lost]
-    return Recording(sorted(series, key=lambda one: one.topic), findings, lost)
+    return Recording(sorted(series, key=lambda one: one.topic), findings, lost, RECORD)
 
 
 FORMAT = Format("ArduPilot DataFlash logs", is_dataflash, one_log(read_dataflash), voyage=True)

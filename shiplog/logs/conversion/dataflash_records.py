@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 HEAD = b"\xa3\x95"
 HEAD_BYTES = 3
@@ -245,8 +246,8 @@ class _Reader:
             layout = self.layouts.get(kind)
             if layout is None or layout.name not in self.wanted:
                 continue
-            places = heads[kinds == kind][:, None] + np.arange(layout.length)
-            rows = raw[places].view(layout.dtype).reshape(-1)
+            rows = sliding_window_view(raw, layout.length)[heads[kinds == kind]]
+            rows = rows.view(layout.dtype).reshape(-1)
             self.parts.setdefault(layout.name, []).append((layout, rows))
 
     def finish(self) -> DataFlash:

@@ -8,10 +8,13 @@ from shiplog.logs.conversion import (
     bags,
     copies,
     dataflash,
+    mavlink,
     nmea,
+    nmea2000,
     nmea_folder,
     signalk,
     table_rows,
+    ulog,
 )
 from shiplog.logs.conversion.original import Format
 from shiplog.ship_profile.profile import Profile
@@ -21,6 +24,9 @@ FORMATS = (
     nmea_folder.FORMAT,
     copies.FORMAT,
     dataflash.FORMAT,
+    mavlink.FORMAT,
+    ulog.FORMAT,
+    nmea2000.FORMAT,
     table_rows.MATLAB,
     table_rows.EXCEL,
     signalk.FORMAT,

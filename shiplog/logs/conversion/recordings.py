@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
@@ -14,18 +14,27 @@ from shiplog.logs.conversion.write import Series
 from shiplog.logs.health.health_report import Finding
 
 ALL = "recorders"  # the extra that brings every library
+NOT_THERE = {  # what can be done without it
+    "position": "No position is in the log: its messages can be checked, and no voyage made of it.",
+    "heading": "No heading is in the log: its messages can be checked, and no voyage made of it, "
+    "since a course over ground is none.",
+    "actuators": "No actuator is in the log: it can be ingested and its sensors compared, and no "
+    "model trained.",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
 class Recording:
     """The topics of one file.
 
-    lost   what of the file is in no topic, a sentence each: the exit code is 3 then
+    lost    what of the file is in no topic, a sentence each: the exit code is 3 then
+    record  what this recorder has to log for a position, a heading and actuators
     """
 
     series: list[Series]
     findings: list[Finding] = field(default_factory=list)
     lost: list[str] = field(default_factory=list)
+    record: Mapping[str, str] = field(default_factory=dict)
 
 
 def one_log(read: Callable[[Path], Recording]) -> Callable[[Original], Iterator[Path]]:
@@ -35,9 +44,22 @@ def one_log(read: Callable[[Path], Recording]) -> Callable[[Original], Iterator[
         found = read(original.path)
         if found.lost:
             original.lost[str(original.given)] = " ".join(found.lost)
-        yield original.written(found.series, found.findings)
+        yield original.written(found.series, [*found.findings, *absent(found)])
 
     return logs
+
+
+def absent(found: Recording) -> list[Finding]:
+    """What a ship's model needs and the file does not hold: what can be done, what to record."""
+    holds = {
+        "position": any({"latitude", "x0_m"} & set(one.columns) for one in found.series),
+        "heading": any("heading" in name for one in found.series for name in one.columns),
+        "actuators": any("actuator" in one.metadata for one in found.series),
+    }
+    return [
+        Finding("not_available", what, f"{NOT_THERE[what]} Log {found.record[what]}.")
+        for what, there in holds.items() if not there and what in found.record
+    ]  # fmt: skip
 
 
 class LibraryMissing(ShiplogError):

@@ -33,6 +33,7 @@ from shiplog.nomenclature.units import SECOND_NS
 
 LOG_CONTRACT = "1"
 CHUNK_BYTES = 1024 * 1024  # bytes before compression
+BLOCK_ROWS = 8192  # messages that are laid out at once: a long log takes no more memory
 
 LOCATION_FIX = "foxglove.LocationFix"
 COVARIANCE = "position_covariance"
@@ -171,10 +172,12 @@ def _write(
     log_time = np.concatenate([log for log, _ in clocks] or [np.empty(0, np.int64)])
     publish = np.concatenate([publish for _, publish in clocks] or [np.empty(0, np.int64)])
     merged = np.argsort(log_time, kind="stable")
-    for which, log, published in zip(
-        channel[merged].tolist(), log_time[merged].tolist(), publish[merged].tolist(), strict=True
-    ):
-        writer.add_message(channels[which], log, next(messages[which]), published)
+    for first in range(0, len(merged), BLOCK_ROWS):
+        block = merged[first : first + BLOCK_ROWS]
+        for which, log, published in zip(
+            channel[block].tolist(), log_time[block].tolist(), publish[block].tolist(), strict=True
+        ):
+            writer.add_message(channels[which], log, next(messages[which]), published)
     writer.finish()
 
 
@@ -259,14 +262,18 @@ def descriptor(schema: str, fields: Sequence[str]) -> FileDescriptorSet:
 
 
 def encode(one: Series, order: np.ndarray) -> Iterator[bytes]:
-    """Wire bytes of each message, in `order` [N].
+    """Wire bytes of each message, in `order` [N]."""
+    for first in range(0, len(order), BLOCK_ROWS):
+        yield from _encoded(one, order[first : first + BLOCK_ROWS])
+
+
+def _encoded(one: Series, order: np.ndarray) -> Iterator[bytes]:
+    """The same of some messages.
 
     Every message is a row of a byte matrix wide enough for the longest; `keep` masks the bytes
     that proto3 leaves out (zeros, the unused end of a varint), and one gather joins what stays.
     """
     rows = len(order)
-    if rows == 0:
-        return
     time = np.asarray(one.time, np.int64)[order]
     frame = _Field(rows).constant(one.frame_id.encode())
     numbers = [_column(one, name, order) for name in _fields(one)]

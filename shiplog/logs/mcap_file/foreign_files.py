@@ -20,7 +20,6 @@ START_BYTES = 65_536  # that tell a file by its content
 BINARY_SHARE = 0.01  # of zero bytes at the start: texts have none, but for UTF-16, which is marked
 MARKS = (b"\xff\xfe", b"\xfe\xff")  # of UTF-16
 BLANKS = b"\xef\xbb\xbf \t\r\n"  # before a text begins, the mark of UTF-8 among them
-TELEMETRY_US = (1_000_000_000_000_000, 4_000_000_000_000_000)  # of 2001 to 2096
 FOLDER = "shiplog reads the folder of these tables"
 TABLE = "shiplog reads that table"
 Test = Callable[[bytes, Path], bool]
@@ -69,15 +68,6 @@ def _zip_of(*names: str) -> Test:
     return test
 
 
-def _telemetry(start: bytes, path: Path) -> bool:
-    """MAVLink packets, each behind its time [µs] in eight bytes, the highest first."""
-    low, high = TELEMETRY_US
-    return (
-        len(start) > 9 and start[8] in (0xFE, 0xFD)
-        and low < int.from_bytes(start[:8], "big") < high
-    )  # fmt: skip
-
-
 def _json(start: bytes, path: Path) -> bool:
     line = start.lstrip(BLANKS).split(b"\n", 1)[0].strip()
     if not line.startswith((b"{", b"[")):
@@ -93,10 +83,6 @@ MAVLINK_WAY = (
     "make tables of it, one a kind of message, with mavlogdump.py of the Python package pymavlink: "
     "mavlogdump.py --format csv --types GPS {file} > {stem}/GPS.csv, and so on; " + FOLDER
 )
-CANBOAT_WAY = (
-    "decode it with analyzer of canboat, {tool} | analyzer -json, and make a table of each PGN, "
-    "with its timestamp; " + FOLDER
-)
 GPSBABEL_WAY = (
     "gpsbabel -i {format} -f {file} -o unicsv -F {stem}.csv makes a table of its track; " + TABLE
     + ". A ship's model needs a heading, too, which a track does not have"
@@ -108,15 +94,8 @@ def _gpsbabel(name: str) -> str:
     return GPSBABEL_WAY.replace("{format}", name)
 
 
-def _canboat(tool: str) -> str:
-    return CANBOAT_WAY.replace("{tool}", tool)
-
-
 KINDS = (
     Kind("an ArduPilot DataFlash log as text", MAVLINK_WAY, _text(r"^FMT, ?128, ?89, ?FMT")),
-    Kind("a MAVLink telemetry log", MAVLINK_WAY, _telemetry),
-    Kind("a PX4 ULog", "make tables of it, one a topic, with ulog2csv of the Python package "
-         "pyulog: ulog2csv -o {stem} {file}; " + FOLDER, _begins(b"ULog\x01\x12\x35")),
     Kind("an HDF5 file", "write its series as a table, in Python with h5py; " + TABLE,
          _begins(b"\x89HDF\r\n\x1a\n")),
     Kind("a NetCDF file", "write its variables as a table, in Python with xarray: "
@@ -144,14 +123,6 @@ KINDS = (
          "its NMEA 0183 sentences as a text, one a line; shiplog reads both",
          _begins(b"\xd4\xc3\xb2\xa1", b"\xa1\xb2\xc3\xd4", b"\x4d\x3c\xb2\xa1",
                  b"\xa1\xb2\x3c\x4d", b"\x0a\x0d\x0d\x0a")),
-    Kind("a candump of a CAN bus (NMEA 2000)", _canboat("candump2analyzer {file}"),
-         _text(r"\A\(\d+\.\d+\) +\S+ +[0-9A-Fa-f]{3,8}#")),
-    Kind("a candump of a CAN bus (NMEA 2000)", _canboat("candump2analyzer {file}"),
-         _text(r"\A(\(\d+\.\d+\) +)?\w+ +[0-9A-Fa-f]{8} +\[\d\]( +[0-9A-Fa-f]{2})+")),
-    Kind("raw NMEA 2000", _canboat("cat {file}"), _text(
-        r"\A\d{4}-\d\d-\d\d[T-]\d\d:\d\d:\d\d[.,]?\d*Z?,\d+,\d{5,6},\d+,\d+,\d+,[0-9a-f]{2},")),
-    Kind("raw NMEA 2000", _canboat("cat {file}"),
-         _text(r"\A\d\d:\d\d:\d\d\.\d+ [RT] [0-9A-Fa-f]{8}( [0-9A-Fa-f]{2})+")),
     Kind("a Signal K log", "let the server write NMEA 0183, with its plugin "
          "signalk-to-nmea0183, and log that; or make a table of it, one row a time and one column "
          "a path; " + TABLE, _both(_json, _text(r'"updates"'))),
