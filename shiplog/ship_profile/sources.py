@@ -211,7 +211,7 @@ class Sensors(Section):
     def kind(self, name: str) -> str:
         """A velocity that is derived from the position is one over ground."""
         sensor = getattr(self, name)
-        if sensor is None and name == "velocity":
+        if sensor is None:  # of what nobody measures, only velocities are derived
             return DERIVED
         return sensor.kind or SENSOR_KINDS[name][0]
 

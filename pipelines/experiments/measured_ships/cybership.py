@@ -39,7 +39,7 @@ def motion(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     heading = turn.state[:, 0]
     found = []
     for order in (1, 2):
-        earth = np.stack((path.state[:, order].real, path.state[:, order].imag), 1)
+        earth = np.stack((np.real(path.state[:, order]), np.imag(path.state[:, order])), 1)
         found.append(np.stack((*to_body(earth, heading).T, turn.state[:, order])))
     return found[0], found[1], sound
 

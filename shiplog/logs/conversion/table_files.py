@@ -9,7 +9,8 @@ from shiplog.logs.conversion import delimited, excel, matlab
 from shiplog.logs.conversion.delimited import DelimitedTable
 from shiplog.ship_profile.profile import Column
 
-Test, Read = Callable[[Path], bool], Callable[[Path, Collection[str]], DelimitedTable]
+Test = Callable[[Path], bool]
+Read = Callable[[Path, Collection[str]], DelimitedTable]
 KINDS: tuple[tuple[Test, Read], ...] = (
     (matlab.is_matlab, matlab.read_matlab),
     (excel.is_excel, excel.read_excel),

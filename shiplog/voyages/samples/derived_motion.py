@@ -78,7 +78,11 @@ def derive(
     measured_rate  [m] rad/s, where a gyro measures it
     """
     place = samples["position"]
-    value = place.value if datum is None else frames.local_plane(*place.value.T, datum)
+    value = (
+        place.value
+        if datum is None
+        else frames.local_plane(place.value[:, 0], place.value[:, 1], datum)
+    )
     position = _rate(
         times, place, value[:, 0] + 1j * value[:, 1], None, sensors.noise("position")
     )  # fmt: skip
@@ -87,7 +91,7 @@ def derive(
         times, pointing, pointing.value[:, 0], 2.0 * math.pi, sensors.noise("heading")
     )  # fmt: skip
     turning = heading.rate if measured_rate is None else measured_rate
-    over_ground = np.stack((position.rate.real, position.rate.imag), 1)
+    over_ground = np.stack((np.real(position.rate), np.imag(position.rate)), 1)
     arm = sensors.velocity_arm_m
     velocity = frames.to_body(over_ground, heading.value)
     velocity = frames.velocity_at_midship(velocity, turning, arm)
@@ -132,7 +136,7 @@ def torn(samples: Samples, value: np.ndarray, period: float | None) -> dict[int,
 
     value   [n], complex where it is a position; `period`: a full turn
     """
-    parts = (value.real, value.imag) if np.iscomplexobj(value) else (value,)
+    parts = (np.real(value), np.imag(value)) if np.iscomplexobj(value) else (value,)
     found: dict[int, float] = {}
     for part in parts:
         for at, step in fault_detection.steps(part, samples.noise, period or ENDLESS):
@@ -183,11 +187,16 @@ def _channel(
     if not known.any():
         return None
     size = channel.to_display
+    of_source = size if of == "heading" else 1.0  # a position is in m
     return DerivedChannel(
-        channel.name, of, *(_figures(size * _rms(one[known])) for one in (row, mean)),
-        channel.display_unit, _figures(source.sigma * (size if of == "heading" else 1.0)),
-        _figures(source.jerk * (size if of == "heading" else 1.0)),
-    )  # fmt: skip
+        channel=channel.name,
+        of=of,
+        sigma=_figures(size * _rms(row[known])),
+        sigma_mean=_figures(size * _rms(mean[known])),
+        unit=channel.display_unit,
+        sample_sigma=_figures(of_source * source.sigma),
+        jerk=_figures(of_source * source.jerk),
+    )
 
 
 def _rms(values: np.ndarray) -> float:

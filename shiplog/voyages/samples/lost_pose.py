@@ -73,7 +73,8 @@ class _Part:
 
 def _together(parts: Mapping[str, _Part]) -> list[tuple[str, ...]]:
     """Sources that were written at once, by their stamps: one instrument's, and told together."""
-    if len(parts) == 2 and np.array_equal(*(part.times for part in parts.values())):
+    times = [part.times for part in parts.values()]
+    if len(times) == 2 and np.array_equal(times[0], times[1]):
         return [tuple(parts)]
     return [(name,) for name in parts]
 
