@@ -233,8 +233,8 @@ def test_the_reference_has_every_key_kind_channel_and_unit():
     ("sensors", "words"),
     [
         (("position", "velocity"), "has no heading,"),
-        (("heading",), "has no position and no velocity,"),
-        ((), "has no position and no velocity and no heading,"),
+        (("heading",), "has no position,"),
+        ((), "has no position and no heading,"),
     ],
 )
 def test_what_a_log_does_not_have_is_reported_with_what_records_it(sensors, words):

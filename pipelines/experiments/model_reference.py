@@ -72,6 +72,7 @@ WITHOUT_PARAMETERS = {  # numbers that are made for each ship: realistic and pra
 }
 NEEDED = {
     "yaw rate": "a yaw rate sensor",
+    "velocity": "a velocity",
     "body velocity": "a velocity in body axes",
     "wind": "a wind sensor",
     "wind force": "a wind force in the model",

@@ -18,7 +18,7 @@ def convert(
         typer.Argument(
             help="CSV or Parquet tables, NMEA 0183 text, Signal K logs, folders of one of them per "
             "topic or instrument, ROS bags, ArduPilot DataFlash logs, MAVLink "
-            "telemetry logs, PX4 ULog files, NMEA 2000 logs."
+            "telemetry logs, PX4 ULog files, NMEA 2000 logs, MATLAB files, Excel workbooks."
         ),
     ],
     out: Annotated[Path, typer.Option(help="Folder for the logs.")],

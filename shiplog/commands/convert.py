@@ -116,7 +116,7 @@ def draft(path: Path, vessel: str | None = None) -> str:
     with said, packed.unpacked(path) as source:
         if not path.exists() or is_log(source):
             return draft_log(source, vessel)
-        if formats.recognise(source) is table_rows.FORMAT:
+        if formats.recognise(source).table:
             table_rows.refuse_others(source)
             return draft_table(source, vessel)
         if recorded := _recorded(source):

@@ -16,6 +16,7 @@ from shiplog.machine.paths import refuse_same_names
 from shiplog.machine.unexpected import unexpected
 from shiplog.models.causes import user
 from shiplog.nomenclature.channels import STATE, VELOCITY_IN_STATE
+from shiplog.report.evaluation import derived
 from shiplog.report.evaluation.evaluation import Evaluation
 from shiplog.report.figures.plots import Plots
 from shiplog.report.page import html
@@ -115,8 +116,15 @@ def evaluate_runs(
         contradicted=contradicted.list_contradicted(store, names),
         datums={name: found for name in names if (found := store.origin(name)[1]) is not None},
         ship_time=ship_time.of(first.profile.ship.length_m, first.training()),
+        derived=derived.together(store.report(_whole(store, name)) for name in names),
     )
     return replace(found, shown=_shown(found, store))
+
+
+def _whole(store: Store, name: str) -> str:
+    """The voyage that a name is of, or is a part of."""
+    part = store.part_of(name)
+    return name if part is None else part.whole
 
 
 def _shown(found: Evaluation, store: Store) -> Shown:

@@ -43,6 +43,8 @@ _THRUSTER = re.compile(r"thr|motor|esc|servo|pwm")
 _NO_ACTUATION = re.compile(
     r"thrust_n|torque|force|power|current|voltage|temp|zero|neutral|_kw|load|pitch|fuel|press"
 )
+# A shaft's order and a thruster's measure are of one kind: what drives the ship ahead.
+DRIVING = {kind: {"propeller", "thruster"} for kind in ("propeller", "thruster")}
 TWINS = 0.99999  # correlation of two columns that hold one value twice
 PULSES_US = (800.0, 2200.0)  # a servo's pulses, neutral in the middle
 NEUTRAL_US = 1500.0
@@ -60,9 +62,9 @@ def found_actuators(
     for ordered in (False, True):
         kinds = {kind for kind, _ in actuators}
         for kind, one in _called_so(rows, table, ordered):
-            if one.column in taken or (ordered and kind in kinds):
+            if one.column in taken or (ordered and kinds & DRIVING.get(kind, {kind})):
                 continue
-            if _never_moves(kind, rows[one.column]):
+            if _never_moves("thruster" if ordered else kind, rows[one.column]):
                 idle.append(one.column)
                 continue
             taken.add(one.column)
@@ -78,8 +80,8 @@ def found_actuators(
 
 
 def _never_moves(kind: str, values: pl.Series) -> bool:
-    """Whether a column is 0 throughout, or a thruster's is one value: the number of an output, or
-    one that nothing is connected to. A shaft may turn evenly for a whole record."""
+    """Whether a column is 0 throughout, or a thruster's or an order is one value: the number of an
+    output, or one that nothing is connected to. A shaft may turn evenly for a whole record."""
     numbers = values.cast(pl.Float64).fill_nan(None).drop_nulls()
     if len(numbers) < facts.FEW or numbers.n_unique() > 1:
         return False

@@ -9,7 +9,7 @@ from pathlib import Path
 from shiplog.drafting.labels import counted_time, found_labels
 from shiplog.drafting.toml_text import quoted
 from shiplog.exceptions import ProfileError, ShiplogError
-from shiplog.logs.conversion.delimited import is_table, read_table
+from shiplog.logs.conversion.table_files import is_table, read_table
 from shiplog.logs.conversion.topics import STAMP_COLUMNS
 from shiplog.ship_profile.profile import Column
 

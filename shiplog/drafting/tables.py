@@ -25,7 +25,7 @@ from shiplog.drafting.topics import NO_ACTUATOR, OPTIONAL
 from shiplog.exceptions import ShiplogError, listed
 from shiplog.logs.conversion import clock
 from shiplog.logs.conversion.columns import text_of
-from shiplog.logs.conversion.delimited import read_table
+from shiplog.logs.conversion.table_files import read_table
 from shiplog.nomenclature import units
 from shiplog.ship_profile.table_channels import TABLE_CHANNELS
 

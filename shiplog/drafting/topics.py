@@ -20,7 +20,7 @@ from shiplog.nomenclature import units
 from shiplog.ship_profile.units_of_channels import DRIVEN
 
 LOOKED_AT = 8  # of the topics that may hold a channel: the first of them with data is drafted
-OPTIONAL = ("yaw_rate", "wind")  # left out where no topic holds a value
+OPTIONAL = ("velocity", "yaw_rate", "wind")  # left out where no topic holds a value
 
 
 def draft(path: str | Path, vessel: str | None = None, given: str | None = None) -> str:

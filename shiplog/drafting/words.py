@@ -31,7 +31,7 @@ _FOREIGN = re.compile(  # units of forces, powers, pressures, flows: of no chann
 _EDGE = r"(?:^|[/_.\s\-])"
 _SET_POINT = re.compile(
     _EDGE + r"(reference|ref|cmd|command|commanded|desired|des|guidance|set_?point|sp|target|"
-    r"order|ordered|waypoint|goal)(?=[/_.\s\-\d]|$)",
+    r"order|ordered|waypoint|goal|set)(?=[/_.\s\-\d]|$)",
     re.IGNORECASE,
 )
 _ESTIMATE = re.compile(
@@ -76,7 +76,7 @@ def parted(name: str) -> str:
 
 def is_set_point(name: str) -> bool:
     """Whether a topic or column says what was ordered and not what was measured."""
-    return bool(_SET_POINT.search(name))
+    return bool(_SET_POINT.search(name) or _SET_POINT.search(parted(name)))
 
 
 def is_derived(name: str) -> bool:

@@ -33,6 +33,9 @@ Turn = Annotated[float, Field(ge=-360.0, le=360.0)]
 NO_ANGLE = 'needs a unit: nearly every instrument gives "deg", and without one it would be "rad"'
 
 
+DERIVED = "ned"  # kind of a velocity that nobody measured: the position's change
+
+
 def require_factor(sign: float) -> None:
     least, most = FACTORS
     if sign == 0.0:
@@ -167,9 +170,9 @@ class Sensor(Source):
 
 class Sensors(Section):
     position: Sensor
-    velocity: Sensor
+    velocity: Sensor | None = None  # derived from the position where there is none
     heading: Sensor
-    yaw_rate: Sensor | None = None  # differentiated from the heading where there is none
+    yaw_rate: Sensor | None = None  # derived from the heading where there is none
     wind: Sensor | None = None
 
     @model_validator(mode="after")
@@ -206,7 +209,24 @@ class Sensors(Section):
         return self
 
     def kind(self, name: str) -> str:
-        return getattr(self, name).kind or SENSOR_KINDS[name][0]
+        """A velocity that is derived from the position is one over ground."""
+        sensor = getattr(self, name)
+        if sensor is None:  # of what nobody measures, only velocities are derived
+            return DERIVED
+        return sensor.kind or SENSOR_KINDS[name][0]
+
+    @property
+    def derived(self) -> tuple[str, ...]:
+        """Channels that no instrument measures, where velocities are derived from the positions:
+        with what stands in the other columns they say nothing new."""
+        if self.velocity is not None:
+            return ()
+        return ("surge", "sway") if self.yaw_rate is not None else ("surge", "sway", "yaw_rate")
+
+    @property
+    def velocity_arm_m(self) -> tuple[float, float]:
+        """Of the point whose velocity is measured; of the position's where it is derived."""
+        return (self.velocity or self.position).lever_arm_m
 
     def noise(self, name: str) -> float:
         """Stated accuracy of a sensor in SI (position in m), 0 where none is stated."""

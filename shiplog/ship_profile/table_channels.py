@@ -11,7 +11,6 @@ SENSOR_KINDS = {  # what each sensor may be, the first being meant where `kind` 
 }
 NEEDED = {  # sensors without which there is no table, and what records them
     "position": "a GNSS fix or a local position",
-    "velocity": "speed and course over ground, or velocities",
     "heading": "a gyro or a GNSS compass (the course over ground is not the heading)",
 }
 QUATERNION = ("quaternion_x", "quaternion_y", "quaternion_z", "quaternion_w")

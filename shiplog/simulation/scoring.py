@@ -8,6 +8,7 @@ Gradients need bodies of their own, in `training.network_gradient` and in `sensi
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,6 +52,13 @@ def window_loss(error: np.ndarray, dt: np.ndarray) -> np.ndarray:
     """L of each window [N], the inner sum of Eq. 8; infinite where the rollout has diverged."""
     with np.errstate(over="ignore"):
         return (trapezoid(dt) * prediction_error(error)).sum(1)
+
+
+def loss_of_deviations(deviation: Sequence[float], seconds: float) -> float:
+    """E L = T Σ_c (w_c σ_c)²: L of a window of T `seconds` of a perfect model, where surge, sway
+    and yaw rate are known to σ [3] (m/s, m/s, rad/s)."""
+    square = (np.asarray(deviation) * np.array(channels.VELOCITY_WEIGHTS)) ** 2
+    return seconds * float(square.sum())
 
 
 @dataclass(frozen=True)

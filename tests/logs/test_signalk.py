@@ -78,6 +78,25 @@ def test_deltas_become_topics(tmp_path, form):
     assert all("127508 battery (60)" in sentence for sentence in n2k)
 
 
+def test_an_engine_turns_as_its_gear_does_and_without_one_the_draft_asks(tmp_path):
+    """Revolutions are those before the gear, in Hz and without a sign."""
+    words = {0: "Forward", 20: "Neutral", 30: "Reverse"}
+    lines = []
+    for t in SECONDS:
+        gear = next(word for start, word in reversed(words.items()) if t >= start)
+        engines = {"propulsion.port.revolutions": 20.0, "propulsion.starboard.revolutions": 10.0}
+        lines.append(delta(t, engines | {"propulsion.port.transmission.gear": gear}))
+        lines.append(ship(t, source="gps.1"))
+    topics, found = read(tmp_path, lines)
+    port, starboard = topics["/propeller/port/can0_7"], topics["/propeller/starboard"]
+    assert port.columns["speed_rps"].tolist() == [20.0] * 20 + [0.0] * 10 + [-20.0] * 30
+    assert starboard.columns["speed_rps"].tolist() == [10.0] * 60
+    assert port.metadata["gear_ratio"] == starboard.metadata["gear_ratio"] == "1"
+    assert "ahead or astern" in starboard.metadata["doubt"]
+    assert "doubt" not in port.metadata
+    assert "gear" not in " ".join(f.sentence for f in found.findings)
+
+
 def test_nmea_0183_of_the_log_is_read_and_its_deltas_not_again(tmp_path):
     lines = []
     for t in SECONDS:

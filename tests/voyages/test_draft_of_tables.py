@@ -391,3 +391,18 @@ def test_a_speed_is_in_the_unit_of_the_way_whatever_is_still_asked(tmp_path, for
     text = draft_table(tmp_path / "t.csv")
     (line,) = [one for one in text.splitlines() if one.startswith('"SOG"')]
     assert f'unit = "{unit}"' in line and "fits how fast the position changes" in line
+
+
+def test_a_set_point_of_a_drive_that_is_measured_is_no_actuator(tmp_path):
+    """A speed that was ordered once, next to what the two motors got."""
+    time = np.arange(200) * 0.1
+    psi = 0.1 * time
+    table = pl.DataFrame({
+        "t": time, "x": np.sin(psi), "y": -np.cos(psi), "Heading": np.degrees(psi) % 360.0,
+        "SpeedSet": np.full(200, 1.0), "PWM_L": 1500.0 + 100.0 * np.sin(time),
+        "PWM_R": 1500.0 + 80.0 * np.cos(time),
+    })  # fmt: skip
+    table.write_csv(tmp_path / "usv.csv")
+    text = draft_table(tmp_path / "usv.csv")
+    assert text.count("[[actuators]]") == 2
+    assert '"SpeedSet"' not in text.split("[table]")[1].split("#")[0]

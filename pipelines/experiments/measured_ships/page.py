@@ -44,6 +44,8 @@ PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
     "another_simulator": ("3 m ship of another simulator", ("other_ship",)),
     "usv": ("Two unmanned surface vehicles", ("usv_fuzhou", "qixing")),
     "ferries": ("Ferries and a container ship at 1 Hz", ("tycho-brahe", "aurora", "hakusan")),
+    "cybership": ("CyberShip Enterprise I, 1.1 m", ("cybership",)),
+    "recorders": ("A spreadsheet, and two yachts' instruments", ("dalian", "aava", "merrimac")),
     "other_logs": (
         "Logs that are not of one ship", ("mcap, location", "mcap, battery", "mcap, AIS"),
     ),

@@ -40,6 +40,58 @@ field = "heading_deg"
 unit = "deg"
 """
 
+# CyberShip Enterprise I: what `cybership` found of its rows. The places are those of the basin's
+# documents, to a centimetre; the two propellers are abaft midship, the bow thruster ahead of it.
+CSE_PLACES = {  # actuator: row, ahead and to starboard of midship [m], direction [deg]
+    "port_ahead": (8, -0.46, -0.055, 0.0), "port_athwart": (9, -0.46, -0.055, 90.0),
+    "starboard_ahead": (10, -0.46, 0.055, 0.0), "starboard_athwart": (11, -0.46, 0.055, 90.0),
+    "bow": (12, 0.39, 0.0, 90.0),
+}  # fmt: skip
+CSE_POSE = """[sensors.position]
+kind = "local"
+topic = "/ship/state"
+fields = ["x0_m", "y0_m"]
+unit = "m"
+"""
+CSE_ACTUATOR = """[[actuators]]
+name = "{name}"
+kind = "thruster"
+topic = "/thruster/{name}"
+field = "command"
+unit = "1"
+limits = [-1.01, 1.01]
+position_m = [{ahead}, {starboard}]
+direction_deg = {direction}
+
+"""
+CSE_TABLE = """[table]
+"cse1_data_1" = { channel = "time", unit = "s" }
+"cse1_data_2" = { channel = "x0", unit = "m" }
+"cse1_data_3" = { channel = "y0", unit = "m" }
+"cse1_data_7" = { channel = "heading", unit = "rad" }
+"""
+
+
+def _cse() -> dict[str, str]:
+    """What the owner of a matrix without names fills in."""
+    driven = "".join(
+        CSE_ACTUATOR.format(name=name, ahead=ahead, starboard=starboard, direction=direction)
+        for name, (_, ahead, starboard, direction) in CSE_PLACES.items()
+    )
+    columns = "".join(
+        f'"cse1_data_{row}" = {{ channel = "{name}" }}\n' for name, (row, *_) in CSE_PLACES.items()
+    )
+    return {
+        "length_m = 1.0": "length_m = 1.1",
+        "# breadth_m = 0.0": "breadth_m = 0.25",
+        "# mass_kg = 0.0": "mass_kg = 14.8",
+        "# No position was recognised, and shiplog needs one.": CSE_POSE,
+        "# No heading was recognised, and shiplog needs one.": HEADING,
+        "# No actuator was recognised": f"{driven}# No other actuator was recognised",
+        "[table]\n": CSE_TABLE + columns,
+    }
+
+
 DATA_SETS: dict[str, DataSet] = {
     "esso-osaka": DataSet(
         "Esso Osaka, 3 m model, pond",
@@ -125,6 +177,32 @@ DATA_SETS: dict[str, DataSet] = {
         "Hakusan, container ship, 1 Hz",
         "hakusan",
         tables=("hakusan_1hz.parquet",),
+    ),
+    "cybership": DataSet(
+        "CyberShip Enterprise I, pose only",
+        "cybership_enterprise1",
+        tables=("CSE1_data_random_run1.mat", "CSE1_data_random_run3.mat"),
+        mended=_cse(),
+        train=("--window", "20", "--unchecked", "--voyages", "*_run1"),
+        trial=("*_run3",),
+    ),
+    "dalian": DataSet(
+        "USV of Dalian, Excel, circles",
+        "dalian_usv",
+        tables=("*.xlsx",),
+        train=("--window", "20", "--unchecked"),
+    ),
+    "aava": DataSet(
+        "Sailing yacht, NMEA 2000",
+        "signalk_samples",
+        logs=("aava-n2k.data",),
+        mended={"length_m = 1.0": "length_m = 12.0"},
+    ),
+    "merrimac": DataSet(
+        "Yacht at its berth, GoFree",
+        "signalk_samples",
+        logs=("gofree-merrimac.log",),
+        mended={"length_m = 1.0": "length_m = 12.0"},
     ),
     "mcap, location": DataSet(
         "GNSS and sensors, JSON",

@@ -15,6 +15,7 @@ from pipelines.experiments.measured_ships.ships import DataSet
 log = logging.getLogger(__name__)
 
 SETTINGS = Settings()
+READ = (".parquet", ".csv", ".mcap", ".mat", ".xlsx", ".data", ".log")
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ def _commands(one: DataSet, data: Path, folder: Path):
         str(path)
         for pattern in one.tables or one.logs
         for path in sorted(data.glob(pattern))
-        if path.is_dir() or path.suffix in (".parquet", ".csv", ".mcap")
+        if path.is_dir() or path.suffix in READ
     ]
     profile = one.profile or "ship.toml"
     given = data / profile

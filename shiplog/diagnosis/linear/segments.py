@@ -11,6 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from shiplog.nomenclature import channels
 from shiplog.voyages.rows.recording import Record
 from shiplog.voyages.rows.timescale import BIN, NODE_STEP, STEP_ROWS
 
@@ -105,11 +106,15 @@ def cut(record: Record, rows: np.ndarray) -> Cut:
 
 
 def measured(record: Record, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """State [S, B, 6], averaged over bins, and whether most of a bin was measured."""
+    """State [S, B, 6], averaged over bins, and whether most of a bin was measured; never of a
+    channel that is derived from others: p(y, f(y)) = p(y), and it would count twice."""
     g = grid(record)
     whole, ends, per = _bin_sums(record.measured[:, None].astype(float), rows, g)
     measured = whole + ends[:, 1:] > 0.5 * (per + 1)
-    return means_of_bins(record, rows), np.repeat(measured, 6, axis=-1)
+    used = np.repeat(measured, 6, axis=-1)
+    derived = record.profile.sensors.derived
+    used[..., [c.name in derived for c in channels.STATE]] = False
+    return means_of_bins(record, rows), used
 
 
 def means_of_bins(record: Record, rows: np.ndarray) -> np.ndarray:

@@ -49,7 +49,7 @@ def estimate(
     """
     left = (linear.e - linear.j @ d)[..., None]
     products = _channel_products(linear, left, process_noise)
-    counted = np.maximum(linear.cut.used.sum((0, 1)), 1)
+    counted = linear.cut.used.sum((0, 1))
     nodes = (linear.z.shape[-1] - 6) // 3
     T_inverse = np.linalg.inv(decay(process_noise.node_step * np.arange(nodes), process_noise.time))
     least = np.log(np.concatenate((LEAST_NOISE, np.full(3, 1e-12))))
@@ -70,7 +70,8 @@ def estimate(
         one_less_z = np.concatenate((np.ones((len(z), 1, 1)), -z), 1)  # of [r | Z], what z leaves
         E = one_less_z @ np.swapaxes(one_less_z, 1, 2)
         E[:, 1:, 1:] += V
-        noise = products.reshape(6, -1) @ E.reshape(-1) / counted
+        noise = products.reshape(6, -1) @ E.reshape(-1) / np.maximum(counted, 1)
+        noise = np.where(counted > 0, noise, now.noise**2)  # nobody measures it: as it was
         E_aa = E[:, 7:, 7:].mean(0).reshape(3, nodes, 3, nodes)
         acceleration = np.einsum("ij,cicj->c", T_inverse, E_aa) / nodes
         return np.maximum(0.5 * np.log(np.concatenate((noise, acceleration))), least)
@@ -103,7 +104,8 @@ def _coloured(linear: Linear, left: np.ndarray, process_noise: ProcessNoise) -> 
         cost(ρ, τ) = log|Γ| + B log σ²,   n segments of B bins
     """
     used = linear.cut.used
-    whole = used.all((1, 2))
+    there = used.any((0, 1))  # a channel that nobody measures has no noise
+    whole = used[..., there].all((1, 2))
     if whole.sum() < ENOUGH_SEGMENTS:
         return process_noise
     z, error = linear.z[whole], left[whole]
@@ -115,7 +117,7 @@ def _coloured(linear: Linear, left: np.ndarray, process_noise: ProcessNoise) -> 
         process_noise.coloured.copy(),
         process_noise.fade.copy(),
     )
-    for channel in range(6):
+    for channel in np.flatnonzero(there):
         Z = z[:, :, channel]
         gap = error[:, :, channel] - Z @ mean
         E = gap[..., 0].T @ gap[..., 0]

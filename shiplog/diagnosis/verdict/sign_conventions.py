@@ -259,7 +259,26 @@ def _motion_signs(profile: Profile, cut: Windows, read_as: Profile | None) -> It
                 lambda s, f=factor: replace(s, yaw_rate=rate / f),
                 _stated(words, read_as, "yaw_rate"),
             )  # fmt: skip
-    yield from _velocity_signs(read, seen, cut, over_ground, read_as)
+    if profile.sensors.velocity is None:
+        yield from _position_signs(read, seen)
+    else:
+        yield from _velocity_signs(read, seen, cut, over_ground, read_as)
+
+
+def _position_signs(read: Callable[..., Turned], seen: Sighted) -> Iterator[Turned]:
+    """(x₀, -y₀) and (y₀, x₀), of positions whose change is the velocity."""
+    key = "[sensors.position]"
+    mirrored = np.array([1.0, -1.0])
+    yield read(
+        "y0 counted to the other side", f"`sign` of {key}",
+        lambda s: replace(
+            s, position=seen.position * mirrored, velocity=seen.velocity * mirrored
+        ),
+    )  # fmt: skip
+    yield read(
+        "x0 and y0 exchanged", f"the order of `fields` of {key}",
+        lambda s: replace(s, position=seen.position[:, ::-1], velocity=seen.velocity[:, ::-1]),
+    )  # fmt: skip
 
 
 def _velocity_signs(

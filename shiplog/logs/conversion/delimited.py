@@ -81,7 +81,7 @@ def read_table(path: Path, known: Mapping[str, Column] | None = None) -> Delimit
     stated = {name: column.decimal for name, column in known.items() if column.decimal}
     try:
         if path.suffix.lower() == ".parquet":
-            table = _plain(pl.read_parquet(path), stated)
+            table = plain(pl.read_parquet(path), stated)
         else:
             table = _read_text(path, known, stated)
     except (pl.exceptions.PolarsError, OSError, UnicodeError, csv.Error) as error:
@@ -93,8 +93,12 @@ def read_table(path: Path, known: Mapping[str, Column] | None = None) -> Delimit
     return table
 
 
-def _plain(frame: pl.DataFrame, stated: Mapping[str, str]) -> DelimitedTable:
-    """A table of its own types: what stands in it as text has its numbers in plain digits."""
+def plain(frame: pl.DataFrame, stated: Mapping[str, str] | None = None) -> DelimitedTable:
+    """A table of its own types: what stands in it as text has its numbers in plain digits.
+
+    stated  column → its decimal sign, where that is known
+    """
+    stated = stated or {}
     texts = [name for name, dtype in frame.schema.items() if dtype == pl.String]
     if not texts:
         return DelimitedTable(frame)
@@ -195,6 +199,20 @@ def _wide(raw: bytes) -> str | None:
         ].count(0):
             return name
     return None
+
+
+def form_of(lines: list[list[str]], known: Collection[str]) -> Form | None:
+    """Where the header of cells is, and which units follow it; None where no two of them stand in
+    a line. Lines of one cell are remarks."""
+    cut = [line[: max((i + 1 for i, cell in enumerate(line) if cell.strip()), default=0)]
+           for line in lines]  # fmt: skip
+    width = max(map(len, cut), default=0)
+    filled = [sum(bool(cell.strip()) for cell in line) for line in cut]
+    if width < 2 or max(filled) < 2:
+        return None
+    whole = [line + [""] * (width - len(line)) if count > 1 else line
+             for line, count in zip(cut, filled, strict=True)]  # fmt: skip
+    return _headed(whole, width, "\t", known)
 
 
 @dataclass(frozen=True, slots=True)

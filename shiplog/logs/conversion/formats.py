@@ -27,6 +27,8 @@ FORMATS = (
     mavlink.FORMAT,
     ulog.FORMAT,
     nmea2000.FORMAT,
+    table_rows.MATLAB,
+    table_rows.EXCEL,
     signalk.FORMAT,
     nmea.FORMAT,
     table_rows.FORMAT,  # takes what is left

@@ -86,6 +86,7 @@ class Format:
     sure   whether logs can be made of a path that `takes` accepts, as far as a look says; and with
            a profile or without. Unless given, always
     voyage whether each file is a voyage by itself: a folder stands for all such files in it
+    table  whether a profile has to say what its columns are
     """
 
     name: str
@@ -93,6 +94,7 @@ class Format:
     logs: Callable[[Original], Iterator[Path]]
     sure: Callable[[Path, Profile | None], bool] = lambda path, profile: True
     voyage: bool = False
+    table: bool = False
 
 
 def why(error: BaseException, doing: str) -> str:

@@ -40,7 +40,10 @@ PAIRS = {  # topic: schema, and fields with their path, factor and whether they 
 }  # fmt: skip
 POSITION, COMPASS_PATH = "navigation.position", "navigation.headingMagnetic"
 VARIATION, QUALITY = "navigation.magneticVariation", "navigation.gnss.methodQuality"
-ENGINE = re.compile(r"^propulsion\.([^.]+)\.revolutions$")  # Hz
+ENGINE = re.compile(r"^propulsion\.([^.]+)\.revolutions$")  # Hz, without a sign
+GEAR = re.compile(r"^propulsion\.[^.]+\.transmission\.gear$")
+TURNS = {"forward": 1.0, "neutral": 0.0, "reverse": -1.0}  # of the propeller, by the gear's word
+HOLDS_NS = 10 * SECOND_NS  # a gear's position, until the next delta: servers repeat it
 PREFIXES = (POSITION, "navigation.headingTrue", "steering.rudderAngle", "propulsion.*.revolutions")
 NO_FIX = ("no gps", "estimated", "manual", "simulator", "error")  # words of methodQuality
 USED = {POSITION, COMPASS_PATH, VARIATION, QUALITY}
@@ -57,7 +60,7 @@ class Values:
 
     def add(self, path: str, source: str, time: int, received: int, value: object) -> None:
         self.paths[path] += 1
-        if path in USED or ENGINE.match(path):
+        if _is_used(path):
             self.used += 1
             self.by_path.setdefault((path, source), []).append((time, received, value))
 
@@ -67,7 +70,11 @@ class Values:
 
 def unread(values: Values) -> Counter[str]:
     """How many values of other paths there are."""
-    return Counter({p: n for p, n in values.paths.items() if p not in USED and not ENGINE.match(p)})
+    return Counter({path: n for path, n in values.paths.items() if not _is_used(path)})
+
+
+def _is_used(path: str) -> bool:
+    return path in USED or bool(ENGINE.match(path) or GEAR.match(path))
 
 
 def topics_of(values: Values) -> tuple[list[Series], list[Finding]]:
@@ -77,9 +84,7 @@ def topics_of(values: Values) -> tuple[list[Series], list[Finding]]:
         series += _paired(values, topic, schema, fields)
     for path in sorted(values.paths):
         if engine := ENGINE.match(path):
-            field_of = (("speed_rps", path, 1.0, ""),)
-            topic = f"/propeller/{_plain(engine[1])}"
-            series += _paired(values, topic, "shiplog.Propeller", field_of)
+            series += _engines(values, path, engine[1])
     there = {one.topic for one in series}
     made = _compasses(values, "/gyro" if "/gyro" not in there else "/gyro/compass", series)
     return series + made[0], findings + made[1]
@@ -139,6 +144,43 @@ def _paired(values: Values, topic: str, schema: str, fields) -> list[Series]:
             name = _named(topic, source, first)
             made.append(_series(name, schema, time, received, columns, source))
     return made
+
+
+def _engines(values: Values, path: str, name: str) -> list[Series]:
+    """Revolutions of an engine, negative where its gear is astern, 0 in neutral. Without a gear
+    their direction is not known, and the draft asks: an engine turns before its gear, and Signal K
+    counts its revolutions without a sign."""
+    field_of = (("speed_rps", path, 1.0, ""),)
+    gears = values.of(f"propulsion.{name}.transmission.gear")
+    made = []
+    for one in _paired(values, f"/propeller/{_plain(name)}", "shiplog.Propeller", field_of):
+        said = {"actuator": "propeller", "unit": "rev/s", "gear_ratio": "1"}
+        source = one.metadata.get("source", "")
+        rows = gears.get(source) or next(iter(gears.values()), [])
+        direction = _turning(one.time, rows)
+        speed = one.columns["speed_rps"]
+        if direction is None:
+            said["doubt"] = "CHECK: ahead or astern? the log has no propulsion.*.transmission.gear"
+        else:
+            said["why"] = "its direction is that of propulsion.*.transmission.gear"
+            speed = speed * direction
+        columns, metadata = {"speed_rps": speed}, {**one.metadata, **said}
+        made.append(replace(one, columns=columns, metadata=metadata))
+    return made
+
+
+def _turning(time: np.ndarray, rows: list[tuple[int, int, object]]) -> np.ndarray | None:
+    """1, 0 or -1 [n] of the gear's last word before each time, NaN without one that is near; None
+    where none is known."""
+    words = np.array([TURNS.get(str(v).strip().lower(), np.nan) for _, _, v in rows])
+    if not np.isfinite(words).any():
+        return None
+    at = np.array([t for t, _, _ in rows], np.int64)
+    order = np.argsort(at, kind="stable")
+    at, words = at[order], words[order]
+    last = np.searchsorted(at, time, side="right") - 1
+    near = (last >= 0) & (time - at[last.clip(0)] <= HOLDS_NS)
+    return np.where(near, words[last.clip(0)], np.nan)
 
 
 def _compasses(values: Values, topic: str, series: list[Series]) -> tuple[list[Series], list]:

@@ -6,14 +6,19 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from shiplog.logs.conversion import columns
-from shiplog.logs.conversion.delimited import is_table, read_table
+from shiplog.logs.conversion.excel import is_excel
+from shiplog.logs.conversion.matlab import is_matlab
 from shiplog.logs.conversion.original import Format, Original, why
+from shiplog.logs.conversion.table_files import is_program_table, is_table, read_table
 from shiplog.logs.mcap_file import foreign_files
 from shiplog.machine.paths import refuse_namesake
+from shiplog.ship_profile.profile import Profile
 
 
 def refuse_others(path: Path) -> None:
     """Raises LogUnreadable for a file that is no table, and of no other format."""
+    if is_program_table(path):
+        return
     foreign_files.refuse(path)
     if not is_table(path):
         foreign_files.refuse_binary(path, path.name)
@@ -39,7 +44,14 @@ def _logs(original: Original) -> Iterator[Path]:
         yield target
 
 
-FORMAT = Format(
-    "CSV or Parquet tables", lambda path: True, _logs,
-    sure=lambda path, profile: profile is not None and not foreign_files.is_foreign(path),
-)  # fmt: skip
+def _profiled(path: Path, profile: Profile | None) -> bool:
+    return profile is not None and not foreign_files.is_foreign(path)
+
+
+def _named(path: Path, profile: Profile | None) -> bool:
+    return profile is not None
+
+
+MATLAB = Format("MATLAB files", is_matlab, _logs, sure=_named, voyage=True, table=True)
+EXCEL = Format("Excel workbooks", is_excel, _logs, sure=_named, voyage=True, table=True)
+FORMAT = Format("CSV or Parquet tables", lambda path: True, _logs, sure=_profiled, table=True)

@@ -13,9 +13,10 @@ import polars as pl
 from shiplog.exceptions import ChannelMissing, ShiplogError, listed
 from shiplog.logs.conversion import clock
 from shiplog.logs.conversion.columns import named_apart, plain, refuse_scaled, schema_of
-from shiplog.logs.conversion.delimited import is_table, read_table, unlike
+from shiplog.logs.conversion.delimited import unlike
 from shiplog.logs.conversion.nmea import lines_to_series
 from shiplog.logs.conversion.steps_back import of_one_recording
+from shiplog.logs.conversion.table_files import is_table, read_table
 from shiplog.logs.conversion.write import THE_MESSAGES_OWN, Series
 from shiplog.ship_profile.profile import Column, Profile
 

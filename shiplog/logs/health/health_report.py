@@ -85,12 +85,26 @@ class Instrument:
 
 
 @dataclass(frozen=True, slots=True)
+class DerivedChannel:
+    """A channel that no instrument measured, and how well it is known all the same."""
+
+    channel: str
+    of: str  # the channel that it is derived from
+    sigma: float  # standard deviation of a row, in `unit`
+    sigma_mean: float  # the same of a mean over one second
+    unit: str
+    sample_sigma: float  # σ of one sample of `of`, in m or deg
+    jerk: float  # √q of the smoother, in m or deg and s^-2.5
+
+
+@dataclass(frozen=True, slots=True)
 class VoyageReport:
     """The contract's answer of `check` and `ingest` for one log.
 
     instruments that have two samples at least: of fewer no rate is known
     usable_s    seconds that can be averaged to 1 Hz; None where the log was not ingested
     windows     of `channels.WINDOW` such seconds in a row; None likewise
+    derived     channels that no instrument measures
     """
 
     name: str
@@ -103,6 +117,7 @@ class VoyageReport:
     windows: int | None = None
     instruments: tuple[Instrument, ...] = field(default=())
     not_compared: tuple[NotCompared, ...] = field(default=())
+    derived: tuple[DerivedChannel, ...] = field(default=())
 
     @property
     def contradictions(self) -> tuple[Finding, ...]:
@@ -129,6 +144,7 @@ class VoyageReport:
             content["usable_s"], content["windows"],
             tuple(Instrument(**one) for one in content["instruments"]),
             tuple(NotCompared(**one) for one in content["not_compared"]),
+            tuple(DerivedChannel(**one) for one in content.get("derived", ())),
         )  # fmt: skip
 
     def as_json(self) -> dict:
@@ -142,6 +158,7 @@ class VoyageReport:
             "instruments": [asdict(one) for one in self.instruments],
             "findings": [asdict(finding) for finding in self.findings],
             "not_compared": [asdict(one) for one in self.not_compared],
+            "derived": [asdict(one) for one in self.derived],
         }
 
 

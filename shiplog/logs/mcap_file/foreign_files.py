@@ -96,15 +96,11 @@ def _gpsbabel(name: str) -> str:
 
 KINDS = (
     Kind("an ArduPilot DataFlash log as text", MAVLINK_WAY, _text(r"^FMT, ?128, ?89, ?FMT")),
-    Kind("a MATLAB file", "write its variables as a table, in MATLAB with writetable or in Python "
-         "with scipy.io.loadmat; " + TABLE,
-         _begins(b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file")),
     Kind("an HDF5 file", "write its series as a table, in Python with h5py; " + TABLE,
          _begins(b"\x89HDF\r\n\x1a\n")),
     Kind("a NetCDF file", "write its variables as a table, in Python with xarray: "
          "xarray.open_dataset(...).to_dataframe().to_csv(...); " + TABLE,
          _begins(b"CDF\x01", b"CDF\x02", b"CDF\x05")),
-    Kind("an Excel workbook", SPREADSHEET_WAY, _zip_of("xl/")),
     Kind("an Office document of the old kind", SPREADSHEET_WAY,
          _begins(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1")),
     Kind("an OpenDocument file", SPREADSHEET_WAY, _zip_of("mimetype")),

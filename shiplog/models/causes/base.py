@@ -125,9 +125,13 @@ NEEDS: Mapping[str, Callable[[Setting], str | None]] = {
     "yaw rate": _unless(
         lambda s: s.profile.sensors.yaw_rate is not None, "no yaw rate is recorded"
     ),
+    "velocity": _unless(
+        lambda s: s.profile.sensors.velocity is not None,
+        "no velocity is recorded: it is derived from the position, and has its clock",
+    ),
     "body velocity": _unless(
         lambda s: s.profile.sensors.kind("velocity") == "body",
-        "the velocity is recorded over ground",
+        "no velocity is recorded in body axes",
     ),
     "wind": _unless(lambda s: s.profile.has_wind, "no wind is recorded"),
     "wind force": _unless(lambda s: not s.lacking, "the model feels no wind"),

@@ -154,7 +154,10 @@ class ClockOffset(Cause):
 
     @property
     def needs(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleVariableOverride]
-        return {"wind": ("wind", "wind force"), "yaw_rate": ("yaw rate",)}.get(self.channel, ())
+        return {
+            "wind": ("wind", "wind force"), "yaw_rate": ("yaw rate",), "velocity": ("velocity",),
+            "gnss": ("velocity",),
+        }.get(self.channel, ())  # fmt: skip
 
     def read(self, record: Record, p: np.ndarray) -> Record:
         return faults.without_clock_offset(record, self.channel, float(p[0]))

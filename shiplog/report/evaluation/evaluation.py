@@ -4,16 +4,17 @@ tables and JSON."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 import polars as pl
 
 from shiplog.exceptions import RunNotEvaluated, SeveralRuns, listed
+from shiplog.logs.health.health_report import DerivedChannel
 from shiplog.nomenclature.contract import CONTRACT
 from shiplog.nomenclature.numbers import counted, figure
-from shiplog.report.evaluation import tables
+from shiplog.report.evaluation import derived, tables
 from shiplog.report.evaluation import trust as trusted
 from shiplog.report.evaluation.judgement import MEANING, Judgement, force_line, judge
 from shiplog.report.result import Shown, Shows
@@ -75,6 +76,7 @@ class Evaluation(Shows):
     inside     run, channel, share: of the samples inside the 90 % band, where a run has one
     forces     of the first physical run along the voyages, as ComparisonData has them; or None
     datums     voyage → latitude and longitude [deg] of its x₀ = y₀ = 0, where its log had them
+    derived        channels of these voyages that no instrument measured
     contradicted   what was recorded on these voyages and contradicts itself
     ship_time      L/U of the first run's training voyages
     shown          its pictures and its page
@@ -97,6 +99,7 @@ class Evaluation(Shows):
     contradicted: tuple[Contradicted, ...] = ()
     datums: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     ship_time: ShipTime | None = None
+    derived: tuple[DerivedChannel, ...] = ()
     shown: Shown | None = None
     trust: Mapping[str, tuple[CoefficientTrust, ...]] = field(default_factory=dict)
     residual_tests: Mapping[str, tuple[ResidualTest, ...]] = field(default_factory=dict)
@@ -200,16 +203,35 @@ class Evaluation(Shows):
         answer = tables.evaluation_json(errors, self.means, self.coverage)
         shares = self.inside.filter(pl.col("run") == run.name).select("channel", "share")
         judged = self.judgement(run)
-        return answer | {
-            "too_short": list(self.too_short),
-            "sentence": f"{self.warning} {judged.sentence}".strip(),
-            "contradictions": [one.as_json() for one in self.contradicted],
-            "judgement": judged.as_json(),
-            "band_90": dict(shares.iter_rows()),
-            "winds": tables.winds(errors).drop("run").to_dicts(),
-            "trust": [one.as_json() for one in self.trust.get(run.name, ())],
-            "residual_tests": [one.as_json() for one in self.residual_tests.get(run.name, ())],
+        return (
+            answer
+            | {
+                "too_short": list(self.too_short),
+                "sentence": f"{self.warning} {judged.sentence}".strip(),
+                "contradictions": [one.as_json() for one in self.contradicted],
+                "judgement": judged.as_json(),
+                "band_90": dict(shares.iter_rows()),
+                "winds": tables.winds(errors).drop("run").to_dicts(),
+                "trust": [one.as_json() for one in self.trust.get(run.name, ())],
+                "residual_tests": [one.as_json() for one in self.residual_tests.get(run.name, ())],
+            }
+            | self._as_derived
+        )
+
+    @property
+    def _as_derived(self) -> dict:
+        """What was not measured, and what that adds to L; nothing where all was measured."""
+        if not self.derived:
+            return {}
+        return {
+            "derived": [asdict(one) for one in self.derived],
+            "derived_loss": derived.expected_loss(self.derived, self._seconds),
         }
+
+    @property
+    def _seconds(self) -> float:
+        """Of a window, from its first sample to its last."""
+        return self.runs[0].config.window - 1.0
 
     @property
     def window_advice(self) -> str:
@@ -256,6 +278,7 @@ class Evaluation(Shows):
             *[self.judgement(run).sentence for run in self.runs],
             *trusted.better_lines(self.better),
             *([self.window_advice] if self.window_advice else []),
+            *([said] if (said := derived.loss_sentence(self.derived, self._seconds)) else []),
             "",
             f"{MEANING} Means over {count} and over seeds:",
             "",

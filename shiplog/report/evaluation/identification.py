@@ -14,7 +14,7 @@ import polars as pl
 from shiplog.exceptions import listed
 from shiplog.nomenclature.contract import CONTRACT
 from shiplog.nomenclature.numbers import counted, figure
-from shiplog.report.evaluation import tables
+from shiplog.report.evaluation import derived, tables
 from shiplog.report.evaluation import trust as trusted
 from shiplog.report.evaluation.judgement import BASELINES
 from shiplog.report.result import Answer
@@ -66,6 +66,7 @@ class Identification:
         return [
             f"{run.label} in {run.path}, {fitted}{voyages}: {windows} of {long}.",
             *([advice] if advice else []),
+            *([said] if (said := derived.of_profile(run.profile)) else []),
             self.errors,
             f"Baselines on these windows: {baselines}.",
             *([] if run.given else [self._worst]),

@@ -18,6 +18,7 @@ from shiplog.logs.health.health_report import (
 from shiplog.nomenclature.channels import WINDOW
 from shiplog.nomenclature.contract import CONTRACT
 from shiplog.nomenclature.numbers import counted, percent
+from shiplog.report.evaluation import derived
 from shiplog.report.evaluation.judgement import FEWEST_WINDOWS
 from shiplog.report.evaluation.text_table import table
 from shiplog.ship_profile.profile import Profile
@@ -49,6 +50,7 @@ def voyage_lines(report: VoyageReport) -> list[str]:
     )
     return [
         head,
+        *([f"  {said}."] if (said := derived.of_voyages(report.derived)) else []),
         *_instruments(report.instruments),
         *_findings(report.findings),
         *_not_compared(report.not_compared),

@@ -171,10 +171,10 @@ def gather(t: Track) -> Evidence:
     return Evidence(
         t,
         moved,
-        pairs.position_and_velocity(t, moved),
+        None if t.derived else pairs.position_and_velocity(t, moved),
         turned,
         ways[0],
-        None if t.body else ways[1],
+        None if t.body or t.derived else ways[1],
         tuple(_unexplained_share(one) for one in joined),
         pairs.bend(t, moved, t.turned_by_rate) if by_rate else None,
         pairs.bend(t, moved, t.turned),

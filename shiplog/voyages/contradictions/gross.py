@@ -65,7 +65,12 @@ def find(table: pl.DataFrame, profile: Profile) -> Contradictions:
 def _not_compared(t: Track, e: Evidence, counted: list[Driven]) -> Iterator[NotCompared]:
     p = t.profile
     little = "the ship hardly moves"
-    if e.joined is None:
+    if t.derived:
+        yield NotCompared(
+            "position with velocity", "the velocity is the position's own change",
+            "speed and course of a receiver, or a log",
+        )  # fmt: skip
+    elif e.joined is None:
         yield NotCompared("position with velocity", little, MOVES)
     if p.sensors.yaw_rate is None:
         yield NotCompared(
@@ -76,12 +81,12 @@ def _not_compared(t: Track, e: Evidence, counted: list[Driven]) -> Iterator[NotC
         yield NotCompared("yaw rate with heading", "the ship hardly turns", MOVES)
     if "heading" not in e.faulty:
         yield from _heading(t, e)
-    if not t.body and t.arm == 0:
+    if not t.body and t.arm == 0 and not t.derived:
         yield NotCompared(
             "place of the antenna", "position and velocity are of one receiver, and move alike "
             "wherever it stands", "a velocity measured in body axes, or by a second antenna",
         )  # fmt: skip
-    if p.sensors.kind("position") == "local":
+    if p.sensors.kind("position") == "local" and not t.derived:
         yield NotCompared(
             "the scale that position and velocity share", "a unit that both have wrong cancels",
             "a position in latitude and longitude",

@@ -162,7 +162,8 @@ def of_voyage(table: pl.DataFrame, profile: Profile) -> list[Asked]:
         return asked
     if not _allows_speed(profile, rows.speed_quantile):
         froude = rows.speed_quantile / math.sqrt(GRAVITY * profile.ship.length_m)
-        asked.append(Asked("Froude number", froude, "velocity"))
+        by = "velocity" if profile.sensors.velocity is not None else "position"
+        asked.append(Asked("Froude number", froude, by))
     return [*asked, *_turning(rows, profile), *_propellers(rows, profile)]
 
 
@@ -193,7 +194,7 @@ class _Rows:
 def _allows_speed(profile: Profile, speed: float) -> bool:
     """Whether the profile's own limits of the velocity allow this speed."""
     sensor = profile.sensors.velocity
-    if sensor.limits is None:
+    if sensor is None or sensor.limits is None:
         return False
     return speed <= max(abs(limit * sensor.scale()[0][1]) for limit in sensor.limits)
 

@@ -58,6 +58,7 @@ class Track:
     position  [n] complex m, of the antenna   velocity  [n] complex m/s: over ground as measured,
     or ahead + i starboard where the instrument measures in body axes (`body`)
     arm       complex m: from the place of the velocity to that of the position, body axes
+    derived   whether the velocity is the position's own change
     """
 
     profile: Profile
@@ -70,6 +71,7 @@ class Track:
     body: bool
     arm: complex
     driven: dict[str, np.ndarray]  # actuators [n], SI
+    derived: bool = False
 
     @property
     def bins(self) -> int:
@@ -184,7 +186,8 @@ def track(table: pl.DataFrame, profile: Profile) -> Track | None:
     heading = columns["heading"]
     ahead = np.cos(heading) + 1j * np.sin(heading)
     of_position, of_velocity = (
-        complex(*one.lever_arm_m) for one in (profile.sensors.position, profile.sensors.velocity)
+        complex(*arm)
+        for arm in (profile.sensors.position.lever_arm_m, profile.sensors.velocity_arm_m)
     )
     position = columns["x0"] + 1j * columns["y0"]
     velocity = columns["surge"] + 1j * columns["sway"] + 1j * columns["yaw_rate"] * of_velocity
@@ -209,6 +212,7 @@ def track(table: pl.DataFrame, profile: Profile) -> Track | None:
         position=bridged(position), velocity=bridged(velocity),
         body=body, arm=of_position - of_velocity,
         driven={name: columns[name] for name in profile.actuator_names},
+        derived=profile.sensors.velocity is None,
     )  # fmt: skip
 
 

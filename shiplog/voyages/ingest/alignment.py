@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 import polars as pl
 
-from shiplog.logs.health.health_report import Finding, Instrument
+from shiplog.logs.health.health_report import DerivedChannel, Finding, Instrument
 from shiplog.nomenclature import channels, frames
 from shiplog.nomenclature.channels import Quality
 from shiplog.ship_profile.profile import Actuator, Sensor
 from shiplog.voyages.ingest.voyage_grid import VoyageGrid, mark_gaps, mark_holds, mark_jumps
 from shiplog.voyages.rows import left_out, resampling, sample_faults
-from shiplog.voyages.samples import actuator_limits, status
+from shiplog.voyages.samples import actuator_limits, derived_motion, status
 from shiplog.voyages.samples.sampling import Sampled
 
 RESOLVED = {  # of a sensor: the channel whose unit its resolution has
@@ -33,6 +33,7 @@ class Aligned:
     left_out: list[Finding]
     datum: tuple[float, float] | None  # latitude, longitude [deg] of x0 = y0 = 0
     misplaced: Finding | None  # a datum that lies elsewhere
+    derived: tuple[DerivedChannel, ...] = ()  # channels that no instrument measures
 
 
 def aligned(sampled: Sampled) -> Aligned:
@@ -41,7 +42,7 @@ def aligned(sampled: Sampled) -> Aligned:
     explained = left_out.times_of([*sampled.refused, *sampled.implausible])
     grid = VoyageGrid(resampling.grid(sampled.start, sampled.end), explained=explained)
     grid.findings += left_out.findings_of(sampled.implausible, sampled.start)
-    _motion(grid, sampled)
+    derived = _motion(grid, sampled)
     if profile.sensors.wind is not None:
         _wind(grid, profile.sensors.wind, sampled.sensors["wind"])
     for actuator in profile.actuators:
@@ -70,31 +71,43 @@ def aligned(sampled: Sampled) -> Aligned:
         if len(one.time) > 1 and not one.hold
     )
     return Aligned(
-        table, grid.seconds, grid.findings, instruments, found, sampled.datum, sampled.misplaced
-    )
+        table, grid.seconds, grid.findings, instruments, found, sampled.datum, sampled.misplaced,
+        derived,
+    )  # fmt: skip
 
 
-def _motion(grid: VoyageGrid, sampled: Sampled) -> None:
-    """Position, heading, velocity and yaw rate at midship."""
+def _motion(grid: VoyageGrid, sampled: Sampled) -> tuple[DerivedChannel, ...]:
+    """Position, heading, velocity and yaw rate at midship; what is said of the derived ones."""
     sensors, samples = sampled.profile.sensors, sampled.sensors
     heading = grid.place("heading", samples["heading"])[:, 0]
+    yaw_rate = None
     if sensors.yaw_rate is not None:
         yaw_rate = grid.place("yaw_rate", samples["yaw_rate"])[:, 0]
-    else:
+    elif sensors.velocity is not None:
         turning = sample_faults.differentiated(samples["heading"])
         yaw_rate = resampling.interpolate_samples(grid.times, turning).value[:, 0]
     position = grid.place("position", samples["position"])
     if sampled.datum is not None:
         position = frames.local_plane(position[:, 0], position[:, 1], sampled.datum)
     position = frames.position_at_midship(position, heading, sensors.position.lever_arm_m)
-    velocity = grid.place("velocity", samples["velocity"])
-    if sensors.kind("velocity") != "body":
-        velocity = frames.to_body(velocity, heading)
-    velocity = frames.velocity_at_midship(velocity, yaw_rate, sensors.velocity.lever_arm_m)
+    derived: tuple[DerivedChannel, ...] = ()
+    if sensors.velocity is None:
+        motion = derived_motion.derive(grid.times, samples, sampled.datum, sensors, yaw_rate)
+        lost = grid.unknown["position"] | grid.unknown["heading"]
+        velocity = np.where(lost[:, None], np.nan, motion.velocity)
+        yaw_rate = np.where(lost, np.nan, motion.yaw_rate) if yaw_rate is None else yaw_rate
+        derived = motion.channels
+    else:
+        assert yaw_rate is not None
+        velocity = grid.place("velocity", samples["velocity"])
+        if sensors.kind("velocity") != "body":
+            velocity = frames.to_body(velocity, heading)
+        velocity = frames.velocity_at_midship(velocity, yaw_rate, sensors.velocity_arm_m)
     grid.columns |= {
         "x0": position[:, 0], "y0": position[:, 1], "heading": frames.wrap(heading),
         "surge": velocity[:, 0], "sway": velocity[:, 1], "yaw_rate": yaw_rate,
     }  # fmt: skip
+    return derived
 
 
 def _wind(grid: VoyageGrid, sensor: Sensor, samples: resampling.Samples) -> None:

@@ -75,6 +75,7 @@ def build(reading: Reading, profile: Profile, sent: Mapping[str, Senders] | None
         windows=windows,
         instruments=aligned.instruments,
         not_compared=compared.not_compared,
+        derived=aligned.derived,
     )
     return Voyage(
         report.name, profile, reading.contents, table, report, aligned.datum, compared.estimates

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from shiplog.nomenclature.channels import Quality
 from shiplog.ship_profile.profile import Profile
 from shiplog.voyages.rows import fault_detection, held_values, resampling
 from shiplog.voyages.rows.left_out import rows_explained
+from shiplog.voyages.samples import derived_motion
 
 STEP_S = resampling.STEP_NS * 1e-9
 
@@ -128,7 +129,16 @@ def mark_jumps(grid: VoyageGrid, profile: Profile, sampled: dict[str, resampling
     found = []
     scale = held_values.METRE if profile.sensors.kind("position") == "geodetic" else 1.0
     of_position = ("position", "velocity", "heading")
-    steps = _jumps(grid, sampled, of_position, position, over_ground, scale=scale)
+    if profile.sensors.velocity is None:  # derived from the position, and torn where it is
+        place = sampled["position"].value * scale
+        if scale != 1.0 and len(place):  # degrees: those of longitude are shorter
+            place = place * (1.0, math.cos(math.radians(float(sampled["position"].value[0, 0]))))
+        for row, step in _torn(grid, sampled["position"], place[:, 0] + 1j * place[:, 1], None):
+            grid.marks[row] |= int(Quality.JUMP)
+            found.append(_jump("position", row, step, "m", math.inf, "the samples around it"))
+        steps = []
+    else:
+        steps = _jumps(grid, sampled, of_position, position, over_ground, scale=scale)
     for row, step in steps:
         lost = _worth(step, over_ground[row])
         if lost > JUMP_S and step > JUMP_LENGTHS * profile.ship.length_m:
@@ -136,6 +146,9 @@ def mark_jumps(grid: VoyageGrid, profile: Profile, sampled: dict[str, resampling
         found.append(_jump("position", row, step, "m", lost))
     if profile.sensors.yaw_rate is None:  # a derivative is not compared with what it is of
         turns, lasting = _steps(grid, sampled["heading"]), None
+        if profile.sensors.velocity is None:
+            pointing = sampled["heading"].value[:, 0]
+            turns = _torn(grid, sampled["heading"], pointing, 2.0 * math.pi)
     else:
         heading, lasting = (np.nan_to_num(grid.columns[c]) for c in ("heading", "yaw_rate"))
         known = np.isfinite(grid.columns["heading"])
@@ -214,6 +227,18 @@ def _steps(grid: VoyageGrid, samples: resampling.Samples) -> list[tuple[int, flo
     found = fault_detection.steps(samples.value[sound, 0], samples.noise, 2.0 * math.pi)
     rows = [(int(np.searchsorted(grid.times, time[at])), step) for at, step in found]
     return [(row, step) for row, step in rows if 0 < row < len(grid.times)]
+
+
+def _torn(
+    grid: VoyageGrid, samples: resampling.Samples, value: np.ndarray, period: float | None
+) -> list[tuple[int, float]]:
+    """Rows and sizes of the steps of a source whose rate is derived from it, as `derived_motion`
+    has them; value [n] of its samples, complex where it is a position."""
+    sound = ~samples.spike
+    kept = replace(samples, time=samples.time[sound], value=samples.value[sound])
+    steps = derived_motion.torn(kept, value[sound], period).items()
+    rows = [(int(np.searchsorted(grid.times, kept.time[at])), step) for at, step in steps]
+    return sorted((row, step) for row, step in rows if 0 < row < len(grid.times))
 
 
 def _far(name: str, size: float) -> str:

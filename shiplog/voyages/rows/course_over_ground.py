@@ -83,7 +83,8 @@ def course(
     """Of a velocity over ground [m, 2] in m/s, else of the positions [m, 2] in m; heading [m] rad,
     NaN where it is not to be compared. None of a ship that does not mostly go along its keel, ahead
     or astern."""
-    way = _of_velocity(sampled["velocity"], velocity, profile)
+    measured = sampled.get("velocity")  # none where it is derived from the position
+    way = None if measured is None else _of_velocity(measured, velocity, profile)
     way = way or _of_position(sampled["position"], position, profile)
     angle = None if way is None else _unwrapped(way, heading)
     if way is None or angle is None:

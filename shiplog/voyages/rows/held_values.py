@@ -64,6 +64,8 @@ def find_held(
             _moving(fault_detection.improbable(runs, len(samples.time)), samples), None, 0.0
         )
     speed, turning = np.nan_to_num(over_ground), np.nan_to_num(columns["yaw_rate"])[:, None]
+    if name == "position" and "velocity" not in sampled:
+        return []  # a derived velocity repeats with it: `lost_pose` has looked
     if name == "position":
         gone = np.cumsum(speed, axis=0) * STEP_S
         return kept(runs, gone, least, _bias(sampled["velocity"], speed))

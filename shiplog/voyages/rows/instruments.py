@@ -32,7 +32,7 @@ def sighted(state: np.ndarray, axes: Axes, sensors: Sensors) -> Sighted:
     yaw_rate = state[:, 5]
     ahead, aside = sensors.position.lever_arm_m
     position = frames.position_at_midship(state[:, [0, 2]], axes, (-ahead, -aside))
-    ahead, aside = sensors.velocity.lever_arm_m
+    ahead, aside = sensors.velocity_arm_m
     velocity = frames.velocity_at_midship(state[:, [1, 3]], yaw_rate, (-ahead, -aside))
     if sensors.kind("velocity") != "body":
         velocity = frames.to_body(velocity, axes.back)
@@ -44,7 +44,7 @@ def at_midship(
 ) -> np.ndarray:
     """State at midship [n, 6]. `moved`: the antenna, from where the profile has it [m]."""
     arm = np.array(sensors.position.lever_arm_m)
-    of_velocity = np.array(sensors.velocity.lever_arm_m)
+    of_velocity = np.array(sensors.velocity_arm_m)
     shared = bool(np.array_equal(arm, of_velocity))
     position = frames.position_at_midship(readings.position, readings.axes, tuple(arm + moved))
     velocity = readings.velocity

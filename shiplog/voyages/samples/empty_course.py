@@ -38,10 +38,11 @@ def findings(speed_course: np.ndarray, topic: str) -> list[Finding]:
 
 def findings_of(reading: Reading, profile: Profile, raw) -> list[Finding]:
     """The same of a log. `raw(reading, source)` gives times and SI values."""
-    if profile.sensors.kind("velocity") != "sog_cog":
+    velocity = profile.sensors.velocity
+    if velocity is None or profile.sensors.kind("velocity") != "sog_cog":
         return []
-    _, value = raw(reading, profile.sensors.velocity)
-    return findings(value, profile.sensors.velocity.topic)
+    _, value = raw(reading, velocity)
+    return findings(value, velocity.topic)
 
 
 def _without_course(speed_course: np.ndarray) -> np.ndarray:

@@ -238,7 +238,7 @@ class Screen:
         """m/s that the ship can have."""
         sensors = self.profile.sensors
         name = TABLE_CHANNELS["velocity", sensors.kind("velocity")][0]
-        limits = limits_of(self.profile, "velocity", name, sensors.velocity, 0)
+        limits = limits_of(self.profile, "velocity", name, sensors.velocity or sensors.position, 0)
         assert limits is not None
         return max(abs(limits.least), abs(limits.most))
 

@@ -20,6 +20,7 @@ from shiplog.voyages.rows.resampling import Samples
 from shiplog.voyages.samples import (
     datum,
     empty_course,
+    lost_pose,
     required_topics,
     sampling_findings,
     source_samples,
@@ -73,6 +74,7 @@ def sampled(reading: Reading, profile: Profile, sent: Mapping[str, Senders]) -> 
     timed = time_line.one(reading, profile)
     reading, moved = timed.reading, list(timed.findings)
     reading, refused = status.heeded(reading, profile)
+    reading, lost = lost_pose.blanked(reading, profile)
     reading, screen = plausible.screened(reading, profile)
     moved += empty_course.findings_of(reading, profile, source_samples.raw_values)
     mounting = source_samples.mounting(reading, profile)
@@ -112,7 +114,7 @@ def sampled(reading: Reading, profile: Profile, sent: Mapping[str, Senders]) -> 
         origin, misplaced = datum.choose(reading, profile, sensors["position"])
     return Sampled(
         profile, sensors, driven, start, end, [*shared], [*moved, *mounting], [*refused],
-        screen.left_out, frozenset(timed.contradicted), origin, misplaced,
+        [*lost, *screen.left_out], frozenset(timed.contradicted), origin, misplaced,
         tuple(reading.health.findings),
     )  # fmt: skip
 

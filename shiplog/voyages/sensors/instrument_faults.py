@@ -50,7 +50,8 @@ def without_clock_offset(record: Record, channel: str, late: float) -> Record:
     readings = record.sighted
     if channel in ("position", "gnss"):
         readings = replace(readings, position=record.later(readings.position, late))
-    if channel in ("velocity", "gnss"):
+    derived = record.profile.sensors.velocity is None and channel == "position"
+    if channel in ("velocity", "gnss") or derived:
         readings = replace(readings, velocity=record.later(readings.velocity, late))
     if channel == "yaw_rate":
         readings = replace(readings, yaw_rate=record.later(readings.yaw_rate, late))

@@ -150,7 +150,7 @@ def _liveliest(rows: np.ndarray, yaw_rate: np.ndarray, count: int) -> np.ndarray
 
 
 def _arms(profile: Profile) -> tuple[tuple[float, float], tuple[float, float]]:
-    return profile.sensors.position.lever_arm_m, profile.sensors.velocity.lever_arm_m
+    return profile.sensors.position.lever_arm_m, profile.sensors.velocity_arm_m
 
 
 def _in_body_axes(profile: Profile) -> bool:
@@ -214,6 +214,8 @@ def _of_yaw_rate(motion: Motion, profile: Profile) -> Iterator[Estimate | NotCom
 
 def _of_velocity(motion: Motion, profile: Profile) -> Iterator[Estimate | NotCompared]:
     """The position's change against the velocity, turned by the heading where it is body-fixed."""
+    if profile.sensors.velocity is None:  # it is the position's own change
+        return
     body = _in_body_axes(profile)
     of_position, of_velocity = _arms(profile)
     arm = np.subtract(of_position, of_velocity)

@@ -9,6 +9,7 @@ from importlib.metadata import version
 import polars as pl
 
 from shiplog.exceptions import listed
+from shiplog.report.evaluation import derived
 from shiplog.ship_profile.profile import Profile
 from shiplog.training.runs.load_model import Run
 
@@ -39,6 +40,7 @@ class Subject:
     trained_on  voyages that it was fitted to
     voyages     that were judged, with `name`, `start` (ISO 8601, UTC), `seconds`
     window_s    length of a window
+    derived     what was measured and what was derived, where not all was measured
     shiplog     version of the program
     """
 
@@ -51,6 +53,7 @@ class Subject:
     voyages: tuple[JudgedVoyage, ...]
     window_s: int
     shiplog: str
+    derived: str = ""
 
 
 def of(run: Run, made: str, profile: Profile, voyages: pl.DataFrame) -> Subject:
@@ -61,6 +64,7 @@ def of(run: Run, made: str, profile: Profile, voyages: pl.DataFrame) -> Subject:
     return Subject(
         profile.ship.name, float(profile.ship.length_m), run.name, run.label, made,
         tuple(run.trained_on), judged, run.config.window, version("shiplog"),
+        derived.of_profile(profile),
     )  # fmt: skip
 
 
@@ -85,7 +89,9 @@ def sentence(subject: Subject) -> str:
     names = listed((v.name for v in subject.voyages), most=MOST_VOYAGES)
     when = dates([v.start for v in subject.voyages])
     seconds = sum(v.seconds for v in subject.voyages)
+    measured = f" {subject.derived}" if subject.derived else ""
     return (
         f"Ship: {subject.ship}, {subject.length_m:g} m. Voyages: {names} ({when}, "
         f"{seconds:.0f} s). Model: {subject.run}, {subject.made}. shiplog {subject.shiplog}."
+        f"{measured}"
     )

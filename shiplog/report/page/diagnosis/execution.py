@@ -33,6 +33,8 @@ def blocks(source: Source) -> list[Block]:
     if not verdict["base"]["before_effect"]:
         why = "The model's own voyages are not in the store, or are these"
         lines.append([f"{why}: its nominal errors are not known apart."])
+    if subject.get("derived"):
+        lines.append([subject["derived"]])
     found.append(Items(lines))
     if verdict["notes"]:
         found.append(Paragraph(["Notes:"], strong=True))

@@ -7,10 +7,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from shiplog.exceptions import listed
+from shiplog.logs.health.health_report import DerivedChannel
 from shiplog.nomenclature.channels import DEGREE
 from shiplog.nomenclature.numbers import counted, figure, percent
 from shiplog.report.diagnosis.sections.subject import MOST_VOYAGES, begin, dates
 from shiplog.report.diagnosis.terms import TERMS
+from shiplog.report.evaluation import derived
 from shiplog.report.page.blocks import (
     Answers,
     Block,
@@ -235,6 +237,9 @@ def _execution(source: Source) -> list[Block]:
     answer = next(iter(source.answers.values()))
     if answer["too_short"]:
         lines.append([f"Without a window of that length: {listed(answer['too_short'])}."])
+    made = [DerivedChannel(**one) for one in answer.get("derived", ())]
+    if said := derived.loss_sentence(made, subject["window_s"] - 1.0):
+        lines.append([said])
     return [Grid(head, rows, head[2:]), Items(lines)]
 
 

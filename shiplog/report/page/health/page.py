@@ -12,6 +12,7 @@ from shiplog.logs.health.health_report import Finding, VoyageReport
 from shiplog.nomenclature.channels import STATE
 from shiplog.nomenclature.numbers import counted
 from shiplog.report.diagnosis.sections.subject import MOST_VOYAGES, dates
+from shiplog.report.evaluation import derived
 from shiplog.report.figures import picture_data, voyage_tables
 from shiplog.report.figures.content import Content
 from shiplog.report.figures.picture_data import PictureData
@@ -157,6 +158,8 @@ def _voyage(report: VoyageReport) -> list[Block]:
          [number(one.clock_s, "s")])
         for one in report.instruments
     ]  # fmt: skip
+    if said := derived.of_voyages(report.derived):
+        found.append(Paragraph([f"{said[:1].upper()}{said[1:]}."]))
     if rows:
         head = ("instrument", "rate", "resolution", "sigma", "clock")
         found.append(Fold("Instruments", [Grid(head, rows, head[1:])]))
