@@ -16,6 +16,11 @@ MIDDLE = PLACES.mean(0)
 REACH = math.sqrt(((PLACES - MIDDLE) ** 2).sum(1).mean())
 
 
+def at(north: float, east: float) -> np.ndarray:
+    """A place, from the middle of where the ship was."""
+    return MIDDLE + np.array([north, east])
+
+
 def added(label: str, numbers, place, heading=0.0, u=0.0, v=0.0, share=0.0) -> np.ndarray:
     """X, Y, N that the numbers add."""
     state = np.array([[place[0], u, place[1], v, heading, 0.0]])
@@ -31,7 +36,7 @@ def added(label: str, numbers, place, heading=0.0, u=0.0, v=0.0, share=0.0) -> n
 
 def test_without_bend_a_line_is_a_spring_to_its_point():
     """By hand: stiffness times the way to the point, turned into the ship's axes."""
-    k, point, place, heading = 0.08, MIDDLE + [9.0, -4.0], MIDDLE + [3.0, 4.0], 0.7
+    k, point, place, heading = 0.08, at(9.0, -4.0), at(3.0, 4.0), 0.7
     found = added("line", [*k * (point - MIDDLE), k, 0.0, 0.0], place, heading)
     north, east = k * 6.0, -k * 8.0
     c, s = math.cos(heading), math.sin(heading)
@@ -41,13 +46,13 @@ def test_without_bend_a_line_is_a_spring_to_its_point():
 
 def test_with_full_bend_its_pull_is_the_same_at_every_distance():
     """But near its point, where it hangs slack."""
-    k, point = 0.08, MIDDLE + [9.0, -4.0]
+    k, point = 0.08, at(9.0, -4.0)
     numbers = [*k * (point - MIDDLE), k, 1.0, 0.0]
     pull = math.hypot(*numbers[:2], k * REACH)
     for far in (8.0, 20.0, 60.0):
         found = added("line", numbers, point + far * np.array([0.6, 0.8]))
         assert found[:2] == pytest.approx(pull * np.array([-0.6, -0.8]), rel=0.03)
-    near = added("line", numbers, point + [0.05, 0.0])
+    near = added("line", numbers, point + np.array([0.05, 0.0]))
     assert abs(near[0]) < 0.1 * pull
 
 
@@ -60,7 +65,7 @@ def test_where_it_is_made_fast_it_turns_the_ship():
 
 def test_far_away_its_pull_is_the_same_everywhere_and_bends_nothing():
     for bend in (-1.0, 0.0, 1.0):
-        for place in (MIDDLE, MIDDLE + [30.0, -20.0]):
+        for place in (MIDDLE, at(30.0, -20.0)):
             found = added("line", [0.3, 0.4, 0.0, bend, 0.0], place)
             assert found == pytest.approx([0.3, 0.4, 0.0], rel=0.01, abs=1e-9)
 
