@@ -91,7 +91,7 @@ def test_whose_stiffness_may_be_none_has_a_direction_and_no_place():
     assert found["direction"].value == pytest.approx(135.0)
     assert found["direction"].high - found["direction"].low < 1.0
     text = LINE.sentence(found)
-    assert "towards 135 deg" in text and "0.5 m abaft midship" in text
+    assert "towards 135 deg" in text and "0.50 m abaft midship" in text
     assert all(np.isfinite([v.low, v.high]).all() for v in found.values())
 
 

@@ -52,8 +52,11 @@ def _degrees(north: np.ndarray, east: np.ndarray) -> np.ndarray:
     return np.degrees(np.arctan2(east, north)) % 360.0
 
 
-def _on_ship(metres: float) -> str:
-    return f"{abs(metres):.3g} m {'ahead of' if metres >= 0.0 else 'abaft'} midship"
+def _made_fast(at: ParameterEstimate) -> str:
+    if at.low <= 0.0 <= at.high:
+        return "made fast near midship"
+    way = "ahead of" if at.value >= 0.0 else "abaft"
+    return f"made fast {abs(at.value):.2f} m {way} midship"
 
 
 @dataclass(frozen=True)
@@ -180,11 +183,11 @@ class Line(Cause):
 
     def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
         pull = f"{figure(estimates['pull'].value, 3)} N"
-        fast = _on_ship(estimates["position"].value)
+        fast = _made_fast(estimates["position"])
         if "x0" not in estimates:
             towards = round(estimates["direction"].value) % 360
             return (
-                f"A line pulls with {pull} towards {towards} deg, made fast {fast}; its point is "
+                f"A line pulls with {pull} towards {towards} deg, {fast}; its point is "
                 "too far away, or too uncertain, to have a place."
             )
         north, east = (
@@ -192,8 +195,7 @@ class Line(Cause):
             for k in ("x0", "y0")
         )
         return (
-            f"A line pulls towards the point x0 = {north}, y0 = {east} with about {pull}, made "
-            f"fast {fast}."
+            f"A line pulls towards the point x0 = {north}, y0 = {east} with about {pull}, {fast}."
         )
 
     def practical(self, p: np.ndarray, setting: Setting) -> np.ndarray:
@@ -289,8 +291,8 @@ class Tow(Cause):
         return (
             f"A tow pulls with {figure(estimates['pull'].value, 3)} N, in the middle of the "
             f"campaign towards {round(estimates['direction'].value) % 360} deg, and turns by "
-            f"{abs(turn):.0f} deg {'clockwise' if turn >= 0.0 else 'anticlockwise'} in all; made "
-            f"fast {_on_ship(estimates['position'].value)}."
+            f"{abs(turn):.0f} deg {'clockwise' if turn >= 0.0 else 'anticlockwise'} in all; "
+            f"{_made_fast(estimates['position'])}."
         )
 
     def practical(self, p: np.ndarray, setting: Setting) -> np.ndarray:
