@@ -34,6 +34,13 @@ PARAMETERS = {  # as the report prints them
     "wind_force": "`surge_factor`, `sway_factor`, `yaw_factor` (of the model's force)",
     "shallow_water": "`strength` (at the shallowest place: 0.3 at twice the draught)",
     "bank": "`strength` (1 is a bank as published formulas have it)",
+    "line": "`x0`, `y0` (m, the point) or `direction` (deg, towards, where the point is too far "
+    "away), `pull` (N, as it was on average), `stiffness` (N/m; a constant pull has none), "
+    "`position` (m ahead of midship, where it is made fast)",
+    "tow": "`pull` (N), `direction` (deg, towards, in the middle of the campaign), `turn` (deg, "
+    "from its begin to its end, clockwise), `position` (m ahead of midship)",
+    "contact": "`force` (N, where it touches), `reach` (m, the gap at which 37 % of it is left), "
+    "`friction` (of the force, along the wall)",
     "fouling": "`factor` (of the resistance)",
     "payload": "`mass` (kg), `position` (m ahead of midship)",
     "cross_flow_drag": "`factor`",

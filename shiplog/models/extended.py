@@ -93,7 +93,7 @@ class Extended:
         x0, u, y0, v, heading, r = (state[..., i] for i in range(6))
         wet = jnp.stack((x0, u - ahead, y0, v - starboard, heading, r), -1)
         wind = true_wind + jnp.stack((north, east), -1)
-        at = dict(self.constants)
+        at = {**self.constants, "share": share}
         before = named(
             self.stand_in.names,
             values if self.own else jnp.asarray(self.stand_in_values),

@@ -46,6 +46,18 @@ def test_a_cause_of_the_users_own_is_named(sea, trials):
     assert decision.named[0].cause.user
 
 
+def test_a_line_is_named_with_its_point_and_its_pull(sea, trials):
+    """The simulated line pulls as hard at every distance, from midship: no spring, which the search
+    begins with."""
+    place = {"tether_north": 6.0, "tether_east": -4.0}
+    _, decision = judged(sea.campaign, trials("none", tether=1.5, **place))
+    assert labels(decision) == ["line"]
+    found = decision.named[0].estimates
+    for name, wanted in {"x0": 6.0, "y0": -4.0, "pull": 1.5, "position": 0.0}.items():
+        assert found[name].low < wanted < found[name].high, name
+        assert found[name].high - found[name].low < {"pull": 1.0}.get(name, 5.0)
+
+
 # --- without any key: what must change with the data, and what must not
 
 

@@ -25,7 +25,7 @@ from cause_ships import (
 )
 
 from shiplog.models import mmg
-from shiplog.models.causes.environment import Bank, Current, WindForce, _nearest
+from shiplog.models.causes.environment import Bank, Current, WindForce, nearest_share
 
 # --- current --------------------------------------------------------------------------------------
 
@@ -181,10 +181,10 @@ def test_a_wall_attracts_as_much_however_many_points_its_line_has():
     """In one piece, in sixty, and abeam of a point that two pieces share; a second wall adds."""
     distance = np.array([5.0, 2.0, 2.0, 3.0])
     one = np.ones((4, 4))
-    assert _nearest(distance, one).tolist() == [0.0, 0.5, 0.5, 0.0]
+    assert nearest_share(distance, one).tolist() == [0.0, 0.5, 0.5, 0.0]
     two = np.kron(np.eye(2), np.ones((2, 2)))
-    assert _nearest(distance, two).tolist() == [0.0, 1.0, 1.0, 0.0]
-    assert _nearest(np.array([4.0]), np.ones((1, 1))).tolist() == [1.0]
+    assert nearest_share(distance, two).tolist() == [0.0, 1.0, 1.0, 0.0]
+    assert nearest_share(np.array([4.0]), np.ones((1, 1))).tolist() == [1.0]
 
     def pull(points: int) -> np.ndarray:
         wall = tuple((float(x), 40.0) for x in np.linspace(-30.0, 30.0, points))

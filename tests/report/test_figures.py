@@ -92,6 +92,31 @@ def test_arrows_blow_and_set_where_they_should(content):
     assert heads == [(0.0, 1.0), (-1.0, -0.0), (0.0, -1.0)]  # north, wind, current
 
 
+FAST = ((10.0, 4.0), (8.0, 3.0), (13.0, 6.0))  # (x₀, y₀): the point, low ends, high ends
+
+
+def test_a_line_s_point_is_a_cross_as_long_as_its_interval():
+    """y₀ is across and x₀ up, as all of the chart; one that is too far off leaves it as it was."""
+    data = page_content.pictures()
+    made, beyond, plain = (
+        pictures.figure("track", Content(page_content.verdict(), one)).axes[0]
+        for one in (
+            data_files.replace(data, made_fast=FAST),
+            data_files.replace(data, made_fast=((9000.0, 4.0),) * 3),
+            data,
+        )
+    )
+    segments = [c.get_segments()[0].tolist() for c in made.collections if hasattr(
+        c, "get_segments") and len(c.get_segments()) == 1]  # fmt: skip
+    assert [[3.0, 10.0], [6.0, 10.0]] in segments and [[4.0, 8.0], [4.0, 13.0]] in segments
+    assert chart.MADE_FAST in [t.get_text() for t in made.get_legend().get_texts()]
+    assert chart.MADE_FAST not in [t.get_text() for t in beyond.get_legend().get_texts()]
+    assert beyond.get_xlim() == plain.get_xlim() and beyond.get_ylim() == plain.get_ylim()
+    content = Content(page_content.verdict(), data_files.replace(data, made_fast=FAST))
+    words = chart.voyage_words(chart.voyage_table(content), content)
+    assert "x0 10.0 m (8.0 to 13.0), y0 4.0 m (3.0 to 6.0)" in words
+
+
 def test_stretches_of_the_whole_voyage_are_not_drawn():
     whole = {"voyage": page_content.HOSTILE, "start_s": 0.0, "end_s": 100.0, "kind": "held"}
     verdict = page_content.verdict()
@@ -139,9 +164,10 @@ def test_files_of_every_picture(content, tmp_path):
 
 
 def test_what_was_saved_is_read_again(tmp_path):
-    data = page_content.pictures()
+    data = data_files.replace(page_content.pictures(), made_fast=FAST)
     data_files.save(data, tmp_path / "p")
     again = data_files.load(tmp_path / "p")
+    assert again.made_fast == FAST
     for name in data_files.SCHEMAS:
         assert getattr(again, name).equals(getattr(data, name)), name
     assert again.models == dict(data.models) and again.current == data.current

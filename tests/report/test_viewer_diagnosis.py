@@ -12,7 +12,8 @@ from recordings import entities, rows, scalars
 from shiplog.nomenclature.channels import STATE
 from shiplog.report import viewer
 from shiplog.report.diagnosis import diagnosis_pictures
-from shiplog.report.viewer import diagnosis
+from shiplog.report.viewer import diagnosis, trajectory
+from shiplog.report.viewer.comparison_data import MadeFast
 from shiplog.report.viewer.diagnosis_data import AFTER, BEFORE, ERROR_COLUMNS, TRACKS, Exhibit
 
 BLUE, ORANGE, BLACK = 0x0072B2FF, 0xD55E00FF, 0x191919FF
@@ -200,6 +201,21 @@ def test_each_voyage_has_its_tab_with_units_and_colours_reported(exhibit):
         "position error in each held-out window [m]",
         "velocity error of each held-out window, root mean square [cm/s, or 0.1 deg/s]",
     ]  # fmt: skip
+
+
+def test_a_line_s_point_is_a_cross_on_every_chart(exhibit, tmp_path):
+    """East and south are the axes of a chart: (y₀, -x₀). The view reaches as far as the point."""
+    fast = MadeFast((130.0, 8.0), (125.0, 6.0), (140.0, 11.0))
+    path = tmp_path / "line.rrd"
+    viewer.save_diagnosis(replace(exhibit, made_fast=fast), path)
+    for voyage in ("home", "out"):
+        lines = column(path, f"/track/{voyage}/made_fast", "LineStrips2D:strips").to_list()[0]
+        assert [[list(p) for p in line] for line in lines] == [
+            [[8.0, -125.0], [8.0, -140.0]], [[6.0, -130.0], [11.0, -130.0]],
+        ]  # fmt: skip
+    drawn = diagnosis.pictured(replace(exhibit, made_fast=fast)).tracks
+    (_, east), (_, north) = trajectory.extent(drawn, "out")
+    assert east > 8.0 and north > 130.0
 
 
 def test_a_verdict_that_names_nothing_shows_what_is_left(exhibit, tmp_path):

@@ -23,6 +23,7 @@ from shiplog.models.causes.base import (
     si,
 )
 from shiplog.models.causes.environment import Bank, Current, ShallowWater, WindForce
+from shiplog.models.causes.lines import Contact, Line, Tow
 from shiplog.models.causes.sensors import (
     AntennaOffset,
     ClockOffset,
@@ -44,6 +45,7 @@ from shiplog.models.causes.steering import RudderDelay, RudderLag, RudderOffset
 
 CATALOGUE: tuple[Cause, ...] = (
     Current(), WindForce(), ShallowWater(), Bank(),
+    Line(), Tow(), Contact(),
     Fouling(), Payload(), CrossFlowDrag(), ThrustLoss(), ThrustDrift(), RudderForce(),
     RudderOffset(), RudderLag(), RudderDelay(),
     ActuatorLimit(), ActuatorRate(), ActuatorDeadBand(), ActuatorStuck(), ActuatorCoupling(),

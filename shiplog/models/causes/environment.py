@@ -309,14 +309,10 @@ class Bank(Cause):
     def force(self, p: Any, state: Any, at: dict) -> Any:
         lines = at["bank.lines"]
         length, breadth, draught, density = (at["bank.ship"][i] for i in range(4))
-        a, along = lines[:, :2], lines[:, 2:] - lines[:, :2]
-        here = jnp.stack((state[..., 0], state[..., 2]), -1)[..., None, :]
-        part = ((here - a) * along).sum(-1) / (along**2).sum(-1)
-        to = a + jnp.clip(part, 0.0, 1.0)[..., None] * along - here
-        distance = jnp.sqrt((to**2).sum(-1) + 1e-6)
+        to, distance = nearest_points(state, lines)
         gap = jnp.maximum(distance - 0.5 * breadth, 0.0)
         reach, lever = 3.0 * length * jnp.exp(p[1]), 0.25 * length * jnp.exp(p[2])
-        near = _nearest(distance, at["bank.same"]) / (1.0 + (gap / reach) ** 3)
+        near = nearest_share(distance, at["bank.same"]) / (1.0 + (gap / reach) ** 3)
         c, s = jnp.cos(state[..., 4])[..., None], jnp.sin(state[..., 4])[..., None]
         ahead = (c * to[..., 0] + s * to[..., 1]) / distance
         starboard = (c * to[..., 1] - s * to[..., 0]) / distance
@@ -334,7 +330,20 @@ class Bank(Cause):
         )
 
 
-def _nearest(distance: Any, same: Any) -> Any:
+def nearest_points(state: Any, lines: Any) -> tuple[Any, Any]:
+    """From midship to the nearest point of each straight piece [..., n, 2] along x₀ and y₀, and how
+    far that is [..., n].
+
+    lines  [n, 4] where each piece begins and ends
+    """
+    a, along = lines[:, :2], lines[:, 2:] - lines[:, :2]
+    here = jnp.stack((state[..., 0], state[..., 2]), -1)[..., None, :]
+    part = ((here - a) * along).sum(-1) / (along**2).sum(-1)
+    to = a + jnp.clip(part, 0.0, 1.0)[..., None] * along - here
+    return to, jnp.sqrt((to**2).sum(-1) + 1e-6)
+
+
+def nearest_share(distance: Any, same: Any) -> Any:
     """[..., n] share 1 of the piece of each bank that is nearest, shared where pieces are as near:
     a wall attracts as much however many points its line has.
 

@@ -19,7 +19,7 @@ from shiplog.exceptions import listed
 from shiplog.nomenclature.channels import STATE, VELOCITY
 from shiplog.report.diagnosis import page
 from shiplog.report.diagnosis.diagnosis import Diagnosis
-from shiplog.report.viewer.comparison_data import Current
+from shiplog.report.viewer.comparison_data import Current, MadeFast
 from shiplog.report.viewer.diagnosis_data import AFTER, BEFORE, ERROR_COLUMNS, TRACKS, Exhibit
 from shiplog.voyages.rows.recording import Record
 from shiplog.voyages.windows.windows import Windows
@@ -50,6 +50,7 @@ def exhibit(done: Diagnosis) -> Exhibit:
         run=Path(done.verdict.run).name,
         datums=done.datums,
         current=_current(decision),
+        made_fast=_made_fast(decision),
     )
 
 
@@ -59,6 +60,16 @@ def _current(decision: Decision) -> Current | None:
         if named.cause.label == "current":
             north, east = (float(one) for one in named.numbers)
             return Current(float(np.hypot(north, east)), float(np.arctan2(east, north)))
+    return None
+
+
+def _made_fast(decision: Decision) -> MadeFast | None:
+    """Where the named line goes to, if it has a place."""
+    for named in decision.named:
+        at = named.estimates if named.cause.label == "line" else {}
+        if {"x0", "y0"} <= set(at):
+            x0, y0 = at["x0"], at["y0"]
+            return MadeFast((x0.value, y0.value), (x0.low, y0.low), (x0.high, y0.high))
     return None
 
 

@@ -54,7 +54,9 @@ def of_diagnosis(
     if done.after is not None:
         models[AFTER] = f"{run.name}, {EXTENDED}"
     cut = None if done.held is None else done.held.cut
+    fast = exhibit.made_fast
     found = {
+        "made_fast": () if fast is None else (fast.point, fast.low, fast.high),
         "models": models, "named": exhibit.named, "errors": _errors(exhibit),
         "residual": exhibit.residual, "tracks": _tracks(exhibit, cut), "band": _band(run, cut),
     }  # fmt: skip

@@ -28,6 +28,8 @@ MINUTE_M = 1852.0  # m: a minute of latitude
 MOST_WINDOWS = 100  # with a track on the chart of a voyage
 GAP_S = 2.5  # s between rows of a second each, from which a track is broken
 FEW = 1e-9
+MADE_FAST = "the line's point, 90 %"
+FARTHEST_POINT = 1.0  # sizes of the tracks of a voyage: so far off a line's point is still drawn
 
 
 def closeup_window(data: PictureData) -> tuple[str, int] | None:
@@ -107,7 +109,8 @@ def _draw(axes: Axes, table: pl.DataFrame, content: Content, of: str) -> None:
         x0, y0 = np.array(bank).T
         axes.plot(y0, x0, color=colours.web(colours.BANK), linewidth=2.5)
     _draw_starts(axes, table.filter(pl.col("line") != MEASURED))
-    _limit(axes, table, data.length, ROOM[of])
+    _limit(axes, table, data.length, ROOM[of], data.made_fast[:1] if of == "voyage" else ())
+    _draw_made_fast(axes, data)
     _label(axes, data, voyage)
     _draw_scale(axes)
     _draw_arrows(axes, data, voyage)
@@ -122,6 +125,23 @@ def _draw_starts(axes: Axes, simulated: pl.DataFrame) -> None:
             starts["y0"].to_numpy(), starts["x0"].to_numpy(), "o", markersize=3.5, zorder=5,
             color=colours.web(colours.MEASURED), label="window starts",
         )  # fmt: skip
+
+
+def _draw_made_fast(axes: Axes, data: PictureData) -> None:
+    """A cross where a named line goes to, as long as its interval; nothing outside the chart."""
+    if not data.made_fast:
+        return
+    (x, y), (south, west), (north, east) = data.made_fast
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    if not (left <= y <= right and bottom <= x <= top):
+        return
+    axes.errorbar(
+        [y], [x], xerr=[[y - west], [east - y]], yerr=[[x - south], [north - x]], fmt="D",
+        color=colours.web(colours.NAMED_FORCE), markersize=5.0, markerfacecolor="none",
+        capsize=3.0, zorder=6, label=MADE_FAST,
+    )  # fmt: skip
+    axes.set_xlim(left, right)
+    axes.set_ylim(bottom, top)
 
 
 def legend(data: PictureData) -> list[tuple[str, str, str]]:
@@ -163,14 +183,21 @@ def _draw_hulls(
     )
 
 
-def _limit(axes: Axes, table: pl.DataFrame, length: float, room: float) -> None:
+def _limit(
+    axes: Axes, table: pl.DataFrame, length: float, room: float,
+    points: tuple[tuple[float, float], ...] = (),
+) -> None:  # fmt: skip
     """All that was measured, with room for what was simulated: a model that diverges must not
-    shrink the ship to a dot."""
+    shrink the ship to a dot. With `points` (x₀, y₀) where they are not too far off."""
     own = table.filter(pl.col("line") == MEASURED)
     if own.drop_nulls(["x0", "y0"]).is_empty():
         own = table
     ends = [_ends_of(own[name]) for name in ("y0", "x0")]
     size = max(high - low for low, high in ends)
+    beyond = FARTHEST_POINT * size
+    for x0, y0 in points:
+        if all(a - beyond <= v <= b + beyond for v, (a, b) in zip((y0, x0), ends, strict=True)):
+            ends = [(min(a, v), max(b, v)) for v, (a, b) in zip((y0, x0), ends, strict=True)]
     margin = max(MARGIN * size, 1.2 * length)
     spans = []
     for (low, high), name in zip(ends, ("y0", "x0"), strict=True):
@@ -291,10 +318,20 @@ def _ends(table: pl.DataFrame, data: PictureData) -> str:
 
 def voyage_words(table: pl.DataFrame, content: Content) -> str:
     names = ", ".join(label for _, label, _ in legend(content.data))
-    found = f"Chart of {table['voyage'][0]}, north up, tracks: {names}."
+    found = f"Chart of {table['voyage'][0]}, north up, tracks: {names}.{_made_fast(content.data)}"
     if not content.data.models:
         return found
     return f"{found} Every simulated track begins at the measured state, at a dot."
+
+
+def _made_fast(data: PictureData) -> str:
+    if not data.made_fast:
+        return ""
+    (x, y), (south, west), (north, east) = data.made_fast
+    return (
+        f" The line's point is at x0 {x:.1f} m ({south:.1f} to {north:.1f}), y0 {y:.1f} m "
+        f"({west:.1f} to {east:.1f})."
+    )
 
 
 CLOSEUP = Picture(

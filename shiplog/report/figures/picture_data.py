@@ -65,6 +65,8 @@ class PictureData:
                       BEFORE and AFTER, of an evaluation each run's own name
     named             causes whose force `residual.named` is
     current           (speed [m/s], towards [rad]) of a named current; None without one
+    made_fast         (x₀, y₀) [m] of the point that a named line goes to, and of the low and the
+                      high ends of its 90 % interval; empty without one, or where it has no place
     voyages           a row a voyage: start (ISO 8601, UTC), seconds, where x₀ = y₀ = 0 is
                       [deg; null where the log has no coordinates], mean true wind [m/s, rad, where
                       it comes from; null where it has no one direction]
@@ -88,6 +90,7 @@ class PictureData:
     models: Mapping[str, str] = field(default_factory=dict)
     named: tuple[str, ...] = ()
     current: tuple[float, float] | None = None
+    made_fast: tuple[tuple[float, float], ...] = ()
     voyages: pl.DataFrame = field(default_factory=partial(empty, "voyages"))
     measured: pl.DataFrame = field(default_factory=partial(empty, "measured"))
     tracks: pl.DataFrame = field(default_factory=partial(empty, "tracks"))
@@ -139,6 +142,7 @@ def load(folder: Path) -> PictureData:
             banks=tuple(_points(bank) for bank in facts["banks"]), models=dict(facts["models"]),
             named=tuple(facts["named"]),
             current=None if facts["current"] is None else _points([facts["current"]])[0],
+            made_fast=_points(facts.get("made_fast", ())),  # older results have none
             **tables,
         )  # fmt: skip
     except (OSError, ValueError, KeyError, TypeError, pl.exceptions.PolarsError) as error:

@@ -11,10 +11,20 @@ from shiplog.models.causes import CATALOGUE, Cause
 
 SIDE_THRUST = "side_thrust"  # an unrecorded thruster: an answer that is not in the catalogue
 # Numbers that say where or which way, and not how much.
-NO_SIZE = {("current", "direction"), ("payload", "position")}
+NO_SIZE = {
+    ("current", "direction"), ("payload", "position"),
+    ("line", "x0"), ("line", "y0"), ("line", "direction"), ("line", "position"),
+    ("tow", "direction"), ("tow", "turn"), ("tow", "position"),
+}  # fmt: skip
 # Of a number that a diagnosis reports, those whose smallest detectable sizes it lists: it searches
 # for a current's two components, and knows of no speed.
-SEARCHED = {("current", "speed"): ("north", "east")}
+SEARCHED = {
+    ("current", "speed"): ("north", "east"),
+    ("line", "pull"): ("pull_north", "pull_east"),
+    ("tow", "pull"): (
+        "begin_north", "begin_east", "middle_north", "middle_east", "end_north", "end_east",
+    ),
+}  # fmt: skip
 
 
 def parted(name: str) -> tuple[str, str]:

@@ -57,6 +57,27 @@ class Current:
     direction: float  # rad, towards, clockwise from north
 
 
+@dataclass(frozen=True, slots=True)
+class MadeFast:
+    """The point that a line goes to, which a diagnosis named: (x₀, y₀), and the low and the high
+    ends of its 90 % interval [m]."""
+
+    point: tuple[float, float]
+    low: tuple[float, float]
+    high: tuple[float, float]
+
+    def scaled(self, by: float) -> MadeFast:
+        """In a unit of so many metres."""
+        ends = ((x / by, y / by) for x, y in (self.point, self.low, self.high))
+        return MadeFast(*ends)
+
+    @property
+    def cross(self) -> list[list[tuple[float, float]]]:
+        """Two lines through the point, along x₀ and along y₀, as long as its interval."""
+        (x, y), (south, west), (north, east) = self.point, self.low, self.high
+        return [[(south, y), (north, y)], [(x, west), (x, east)]]
+
+
 @dataclass(frozen=True)
 class ComparisonData:
     """Measured voyages, and the simulations of every model and seed.
@@ -73,6 +94,7 @@ class ComparisonData:
     extended    those of the models that a diagnosis extended, which have a colour of their own
     datums      voyage → latitude and longitude [deg] of x₀ = y₀ = 0, where its log had them
     current     the one that a diagnosis named
+    made_fast   where the line goes to that a diagnosis named, if it has a place
     moment      what it is opened at; the beginning of the first voyage unless given
     forces      model, voyage, time, part (hull, propeller, ... total), surge [N], sway [N],
                 yaw [N m] about midship: the force components along the measured voyage
@@ -94,6 +116,7 @@ class ComparisonData:
     extended: tuple[str, ...] = ()
     datums: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     current: Current | None = None
+    made_fast: MadeFast | None = None
     moment: Moment | None = None
 
     @property

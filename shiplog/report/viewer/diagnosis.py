@@ -84,6 +84,7 @@ def pictured(exhibit: Exhibit) -> Pictured:
         extended=(models[AFTER],) if AFTER in models else (),
         datums=datums,
         current=exhibit.current,
+        made_fast=exhibit.made_fast,
         actuators=(),
         has_wind="wind_speed" in exhibit.measured.columns,
         measured=pl.concat([*measured, exhibit.measured]),

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import polars as pl
 
 from shiplog.nomenclature.channels import STATE
-from shiplog.report.viewer.comparison_data import Current
+from shiplog.report.viewer.comparison_data import Current, MadeFast
 
 BEFORE, AFTER = "before", "after"
 TRACKS = {
@@ -41,7 +41,7 @@ class Exhibit:
                model diverges and the window is in none of the figures
     report     Markdown
     run        the name of the model's run, by which it has its colour
-    banks, ship_outline, datums, current   as a comparison has them
+    banks, ship_outline, datums, current, made_fast   as a comparison has them
     """
 
     title: str
@@ -59,6 +59,7 @@ class Exhibit:
     run: str = ""
     datums: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     current: Current | None = None
+    made_fast: MadeFast | None = None
 
     @property
     def voyages(self) -> list[str]:

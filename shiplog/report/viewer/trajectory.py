@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from shiplog.report import colours
 from shiplog.report.figures import hull
-from shiplog.report.viewer import chart, display, style, surroundings
+from shiplog.report.viewer import chart, display, made_fast, style, surroundings
 from shiplog.report.viewer.comparison_data import Moment
 from shiplog.report.viewer.display import Drawn
 from shiplog.report.viewer.style import entity
@@ -126,6 +126,7 @@ def in_chart_units(drawn: Drawn) -> tuple[Drawn, str]:
         measured=drawn.measured.with_columns(km),
         simulated=drawn.simulated.with_columns(km),
         banks=tuple(tuple((x / 1000.0, y / 1000.0) for x, y in bank) for bank in drawn.banks),
+        made_fast=None if drawn.made_fast is None else drawn.made_fast.scaled(1000.0),
     )
     return small, "km"
 
@@ -313,6 +314,9 @@ def _send_chart(
         path = entity("track", voyage, "banks", "labels")
         style.labels(recording, path, middles, ["bank"] * len(middles))
 
+    if drawn.made_fast is not None:
+        made_fast.send(recording, voyage, drawn.made_fast, frame)
+
 
 def extent(
     drawn: Drawn, voyage: str, room: float = 0.0
@@ -333,6 +337,8 @@ def extent(
         ranges.append((float(low), float(high)))
         followed.append(display.column(simulated, name))
     size = max(high - low for low, high in ranges)
+    if drawn.made_fast is not None:
+        ranges = made_fast.seen(ranges, drawn.made_fast, size)
     margin = max(0.08 * size, 1.5 * drawn.ship_length)
     (west, east), (south, north) = (
         _widened(ends, values, room * size) for ends, values in zip(ranges, followed, strict=True)
