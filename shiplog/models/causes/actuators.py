@@ -23,8 +23,8 @@ from shiplog.voyages.rows.recording import Record
 TURNING, PUSHING = ("rudder", "azimuth"), ("propeller", "thruster")
 GROUPS = tuple(f"{kind}s" for kind in (*TURNING, *PUSHING))
 SPOKEN = {"rad": ("deg", np.radians(1.0)), "rev/s": ("rev/s", 1.0), "1": ("1", 1.0)}
-# Share of the force of an actuator that these equations leave wrong: a limit is not sharp, a band is
-# not even, a rate is not one from end to end.
+# Share of an actuator's force that these equations leave wrong: a limit is not sharp, a band is not
+# even, a rate is not one from end to end.
 SHARPNESS = 0.1
 STILL = 1e-9  # of an order's unit: it has not moved
 ALIKE = 0.02  # share of the extent by which two orders have to differ, to be told from each other
