@@ -70,7 +70,7 @@ def test_what_reads_leaves_the_motion_and_what_moves_does_not(cause, base):
     assert (np.abs(changed - plain).max() > 1e-6) != cause.reads
     observed = closed.record(TWIN)
     hard = observed.actuator.copy()
-    hard[600:, :2] += 0.8  # rad, from one row to the next
+    hard[600:, :2] += 1.2  # rad, from one row to the next
     observed = replace(observed, actuator=hard)
     after = cause.read(observed, sized(cause))
     same = all(np.array_equal(getattr(after, n), getattr(observed, n)) for n in CHANGED)

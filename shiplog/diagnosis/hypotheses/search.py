@@ -257,7 +257,10 @@ class Search:
         self.scanned = {
             f.name: scale.score(nothing.evidence + f.evidence, (f.name,), NOMINAL) for f in found
         }
-        self.expected = {f.name: f.expected for f in found if f.expected is not None}
+        self.expected = {  # what a nominal voyage has of a cause has to be exceeded, too
+            f.name: replace(f.expected, cost=f.expected.cost + table.placebo.get(f.name, 0.0))
+            for f in found if f.expected is not None
+        }  # fmt: skip
         self._say_what_would_not_show()
 
     def _say_what_would_not_show(self) -> None:

@@ -54,6 +54,10 @@ class _OnUnits(Cause):
         return f"{self.name}:{self.actuator}" if self.actuator else self.name
 
     @property
+    def count(self) -> int:
+        return max(len(self.parameters), 1)  # a number of its own unit
+
+    @property
     def nominal(self) -> bool:
         return False  # what of it the nominal voyages have, the coefficients have
 
@@ -132,7 +136,8 @@ class ActuatorLimit(_OnUnits):
         "Drive this unit to its ends and see how far it goes: end switches, the pump, a limit that "
         "is set in its controller. Until then simulate with the extended model."
     )
-    parameters = (Parameter("limit", "1", 3.0, 0.05),)
+    parameters = ()
+    realistic, least = 3.0, 0.05  # over the largest order; of it, that a limit takes away
     first_step = 0.7  # about half of what was ordered: a smaller one limits nothing
     separated_by = {
         "thrust_loss": "runs at small and at large orders: a limit leaves the small ones as they "
@@ -145,7 +150,7 @@ class ActuatorLimit(_OnUnits):
         return True
 
     def sizes(self, setting: Setting) -> np.ndarray:
-        return np.array([self.parameters[0].prior / self.reach(setting)])
+        return np.array([self.realistic / self.reach(setting)])
 
     def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(1), np.array([50.0 / self.reach(setting)])
@@ -154,7 +159,7 @@ class ActuatorLimit(_OnUnits):
         return response.limited(recorded, float(p[0]))
 
     def practical(self, p: np.ndarray, setting: Setting) -> np.ndarray:
-        return np.asarray(p[..., 0] * self.reach(setting) * (1.0 - 0.05) > 1.0)
+        return np.asarray(p[..., 0] * self.reach(setting) * (1.0 - self.least) > 1.0)
 
     def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
         return {"limit": self.spoken(1.0 / np.maximum(p[..., 0], 1e-6))}
@@ -178,7 +183,8 @@ class ActuatorRate(_OnUnits):
         "Time this unit from end to end: the pump, the voltage, a ramp in its controller. An order "
         "is no feedback. Until then simulate with the extended model."
     )
-    parameters = (Parameter("rate", "1", 10.0, 0.5),)  # √(length/g), from amidships to its end
+    parameters = ()
+    realistic, least = 10.0, 0.5  # √(length/g), from amidships to its end
     first_step = 1.0
     separated_by = {
         "rudder_lag": "small and large orders: a rate delays the large ones, a lag all alike",
@@ -190,7 +196,7 @@ class ActuatorRate(_OnUnits):
         return math.sqrt(setting.scale["length"] / GRAVITY) / self.reach(setting)
 
     def sizes(self, setting: Setting) -> np.ndarray:
-        return np.array([self.parameters[0].prior * self._time(setting)])
+        return np.array([self.realistic * self._time(setting)])
 
     def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(1), np.array([300.0 * self._time(setting)])
@@ -199,7 +205,7 @@ class ActuatorRate(_OnUnits):
         return response.rate_limited(record, recorded, float(p[0]))
 
     def practical(self, p: np.ndarray, setting: Setting) -> np.ndarray:
-        return np.asarray(p[..., 0] > self.parameters[0].least * self._time(setting))
+        return np.asarray(p[..., 0] > self.least * self._time(setting))
 
     def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
         return {"rate": self.spoken(1.0 / np.maximum(p[..., 0], 1e-6), "/s")}
@@ -222,7 +228,8 @@ class ActuatorDeadBand(_OnUnits):
         "Move the order of this unit slowly through zero, and see when it follows: worn joints, or "
         "the dead zone of its drive. Set that zone in the profile where it is its drive's."
     )
-    parameters = (Parameter("width", "1", 0.15, 0.02),)
+    parameters = ()
+    realistic, least = 0.15, 0.02  # of the largest order
     separated_by = {"rudder_lag": "large orders: a lag delays them, a dead band hardly"}
 
     @property
@@ -234,7 +241,7 @@ class ActuatorDeadBand(_OnUnits):
         return not self._turns
 
     def sizes(self, setting: Setting) -> np.ndarray:
-        return np.array([self.parameters[0].prior * self.reach(setting)])
+        return np.array([self.realistic * self.reach(setting)])
 
     def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(1), np.array([2.0 * self.reach(setting)])
@@ -245,7 +252,7 @@ class ActuatorDeadBand(_OnUnits):
         return response.dead_zone(recorded, float(p[0]))
 
     def practical(self, p: np.ndarray, setting: Setting) -> np.ndarray:
-        return np.asarray(p[..., 0] > self.parameters[0].least * self.reach(setting))
+        return np.asarray(p[..., 0] > self.least * self.reach(setting))
 
     def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
         return {"width": self.spoken(p[..., 0])}
