@@ -71,6 +71,12 @@ class Controls:
         return end, mean / step
 
 
+def untouched(names: tuple[str, ...]) -> Controls:
+    """Of actuators whose positions are known: nothing is ordered, and nothing limits them."""
+    none, all_of = np.zeros(len(names)), np.full(len(names), math.inf)
+    return Controls(names, none, none, none, -all_of, all_of, all_of)
+
+
 def controls(
     profile: Profile, training: pl.DataFrame, rates: Rates, speed: float, rudder_rate: float = 0.0
 ) -> Controls:
