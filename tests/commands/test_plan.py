@@ -96,7 +96,7 @@ def test_limits_that_leave_no_room_are_said(given, tmp_path, options, said):
 def test_water_in_which_nothing_can_be_sailed_is_said(given, monkeypatch):
     """The ship does not stop within a length and a tenth of its approach."""
     monkeypatch.setattr(search, "ROUNDS", 1)
-    run = load_model.load(given)
+    run = plan.refuse_unplannable(load_model.load(given))
     sailor = sailing_run.of_run(run)
     tight = limits.limits(sailor, seconds=280.0, speed=(0.2, 0.6), water=(3.1, 3.1))
     with pytest.raises(NoRoom, match="stays within the limits"):

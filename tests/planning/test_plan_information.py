@@ -1,4 +1,4 @@
-"""Information of a manoeuvre: closed forms of a ship in two numbers, and estimates by Monte Carlo."""
+"""Information of a manoeuvre: closed forms of a ship in two numbers, and many noisy voyages."""
 
 from dataclasses import dataclass
 
