@@ -15,14 +15,11 @@ from shiplog.commands import identify
 from shiplog.commands.bars import staged
 from shiplog.machine import files
 from shiplog.manoeuvres import sheet_fit, trial_sheet
-from shiplog.manoeuvres.trial_sheet import SheetError
 from shiplog.models import MODELS
 from shiplog.nomenclature.channels import LEAST_WINDOW, WINDOW
 from shiplog.report.evaluation.sheet_identification import PAGE, UNTESTED, SheetIdentification
 from shiplog.report.evaluation.text_table import inert
 from shiplog.report.result import Answer
-from shiplog.ship_profile import file as profiles
-from shiplog.ship_profile.profile import Profile
 from shiplog.simulation.sensitivities import Simulator
 from shiplog.training.physics import setup, trust
 from shiplog.training.physics.trust import Information
@@ -57,7 +54,7 @@ def identify_sheet(
     Raises ShiplogError. Nothing is written before the fit has ended well.
     """
     began = time.time()
-    ship = _profile(path, profile)
+    ship = trial_sheet.ship_of(path, profile)
     sheet = trial_sheet.read(path, ship.ship.length_m)
     settings = options.settings()["physics"]
     steps = sheet_fit.substeps(ship, sheet)
@@ -98,16 +95,3 @@ def identify_sheet(
     if not fitted.found.converged:
         notes.insert(0, f"The fit did not converge: {fitted.found.message}.")
     return SheetIdentification(done, sheet.source, fitted.reached, judged, tuple(notes))
-
-
-def _profile(path: Path, chosen: str | None) -> Profile:
-    """Raises SheetError where nothing names a profile."""
-    name = chosen or trial_sheet.profile_of(path)
-    if not name:
-        raise SheetError(
-            f"The trial sheet {path} names no profile of the ship.",
-            hint='add profile = "NAME or PATH" to it, or give --profile.',
-        )
-    ship = profiles.load(name)
-    ship.require_actuators()
-    return ship

@@ -31,6 +31,8 @@ from typing import Any
 
 from shiplog.exceptions import ShiplogError, listed, nearest
 from shiplog.manoeuvres.quantity import QUANTITIES
+from shiplog.ship_profile import file as profiles
+from shiplog.ship_profile.profile import Profile
 from shiplog.simulation.sailing import from_direction
 from shiplog.simulation.schedules import PULL_OUT_ANGLE, PullOut, Stop, Turn, Zigzag
 
@@ -130,6 +132,20 @@ def profile_of(path: Path) -> str:
         raise SheetError(f"The trial sheet {path}: profile is no text.", hint="name a profile.")
     beside = path.parent / named
     return str(beside) if named.endswith(".toml") else named
+
+
+def ship_of(path: Path, chosen: str | None) -> Profile:
+    """The ship of a sheet: the profile that was chosen, else the one it names. Raises SheetError,
+    where nothing names one, or ProfileError."""
+    name = chosen or profile_of(path)
+    if not name:
+        raise SheetError(
+            f"The trial sheet {path} names no profile of the ship.",
+            hint='add profile = "NAME or PATH" to it, or give --profile.',
+        )
+    ship = profiles.load(name)
+    ship.require_actuators()
+    return ship
 
 
 def _toml(path: Path) -> dict[str, Any]:

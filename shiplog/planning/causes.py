@@ -47,7 +47,6 @@ SENSORS: dict[str, tuple[str, ...]] = {
     "draught fore and aft": ("payload",),
     "an echo sounder": ("shallow_water",),
     "a distance to the bank (lidar, radar)": ("bank",),
-    "the orders of every thruster, recorded": ("side_thrust",),
     "a satellite clock for every channel": ("clock_offset",),
     "a survey of the antenna's place": ("antenna_offset",),
 }

@@ -79,7 +79,8 @@ class Instrument:
         low, high = math.log(LEAST_SCATTER), math.log(MOST_SCATTER)
         if off(low) >= 0.0 or off(high) <= 0.0:
             return replace(self, scatter=LEAST_SCATTER if off(low) >= 0.0 else MOST_SCATTER)
-        return replace(self, scatter=math.exp(brentq(off, low, high, xtol=1e-3)))
+        root: Any = brentq(off, low, high, xtol=1e-3)
+        return replace(self, scatter=math.exp(root))
 
     def series(self, state: np.ndarray, actuator: np.ndarray, wind: np.ndarray) -> WindowSeries:
         """Windows end to end of one manoeuvre: state [K, 6], actuator [K, A], true wind [2]."""

@@ -19,13 +19,14 @@ from shiplog.planning.information import Instrument, worth
 from shiplog.planning.limits import ORDERS, Limits, NoRoom
 from shiplog.simulation.helm import OfTables
 from shiplog.simulation.sailing import STILL, Sailed, Steps, Water, sail
-from shiplog.simulation.schedules import HOLD, Schedule
+from shiplog.simulation.schedules import Schedule
 from shiplog.training.runs.sailing_run import Sailor
 
 MEMBERS = 32  # drawn in a round
 ELITE = 6  # of them, that make the next round
 ROUNDS = 160
 SECONDS_OF_CPU = 35.0  # after which the search ends with the best it has
+STEP_TIME = 0.1  # s before the next order, until which the last one holds
 FIRST, LEAST = 0.5, 0.04  # spread of the first round, and the least, in half ranges
 KEEP = 0.3  # of the mean and spread of the round before
 BEYOND = 10.0  # worth of a manoeuvre beyond the limits is minus this, and minus its excess
@@ -46,10 +47,14 @@ class Found:
     rounds: int
 
     def schedule(self, names: tuple[str, ...], seconds: float) -> Schedule:
-        """For `simulate --schedule`."""
-        times = tuple(float(self.hold * k) for k in range(len(self.orders)))
-        columns = {n: tuple(self.orders[:, i].tolist()) for i, n in enumerate(names)}
-        return Schedule(times, columns, HOLD, "planned", seconds)
+        """For `simulate --schedule`, whose orders are joined by lines: each is given again just
+        before the next."""
+        begin = self.hold * np.arange(len(self.orders))
+        times = np.stack((begin, begin + self.hold - STEP_TIME), 1).ravel()
+        times[-1] = seconds
+        twice = np.repeat(self.orders, 2, axis=0)
+        columns = {n: tuple(twice[:, i].tolist()) for i, n in enumerate(names)}
+        return Schedule(tuple(times.tolist()), columns, name="planned")
 
 
 @dataclass(frozen=True)
