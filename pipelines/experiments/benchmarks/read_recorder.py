@@ -88,9 +88,7 @@ def dataflash_by_shiplog(path: Path) -> int:
 
 
 def dataflash_by_library(path: Path) -> int:
-    from pymavlink import mavutil
-
-    log = mavutil.mavlink_connection(str(path))
+    log = importlib.import_module(LOOPS["dataflash"]).mavlink_connection(str(path))
     columns: dict[str, list] = {name: [] for name in OF_A_SHIP}
     while (message := log.recv_match(type=list(OF_A_SHIP))) is not None:
         kind = message.get_type()
@@ -169,9 +167,8 @@ def ulog_by_shiplog(path: Path) -> int:
 
 
 def ulog_by_library(path: Path) -> int:
-    from pyulog import ULog
-
-    return sum(len(one.data["timestamp"]) for one in ULog(str(path)).data_list)
+    read = importlib.import_module(LOOPS["ulog"]).ULog
+    return sum(len(one.data["timestamp"]) for one in read(str(path)).data_list)
 
 
 CAN = (  # identifier and payload of a yacht's bus, and how often a second
@@ -205,9 +202,8 @@ def candump_by_shiplog(path: Path) -> int:
 
 
 def candump_by_library(path: Path) -> int:
-    from nmea2000.decoder import NMEA2000Decoder
-
-    decoder, columns = NMEA2000Decoder(), []
+    decoder = importlib.import_module(LOOPS["candump"]).NMEA2000Decoder()
+    columns = []
     with path.open() as stream:
         for line in stream:
             if (message := decoder.decode(line)) is not None:

@@ -249,5 +249,6 @@ def _least(dtype: np.dtype) -> int:
         names.pop()
     if not names:
         return dtype.itemsize
-    last = (dtype.fields or {})[names[-1]]
-    return int(last[1]) + last[0].itemsize
+    offsets = {name: part for name, part in (dtype.fields or {}).items()}
+    kind, offset, *_ = offsets[names[-1]]
+    return int(offset) + kind.itemsize
