@@ -64,8 +64,8 @@ out, `ingest` estimates it from each record, and `voyage.json` has what it found
 
 Position and heading are needed. Without a velocity, it and the yaw rate are
 [derived](../use/pose_only.md) from them; without a yaw rate sensor alone the heading is
-differentiated; without a wind sensor no model has the force of the wind. Without actuators a log can be ingested
-and its sensors checked, and no model can be trained.
+differentiated; without a wind sensor no model has the force of the wind. Without actuators a log
+can be ingested and its sensors checked, and no model can be trained.
 
 Axes: x0 to the north, y0 to the east, x ahead, y to starboard, angles clockwise; a positive rudder
 turns the bow to starboard; the wind's angle is where it blows from, clockwise from the bow.
