@@ -44,7 +44,7 @@ ONLY = {  # a library, and the packages and modules that may import it
     "mcap": {"logs"}, "mcap_protobuf": {"logs"}, "mcap_ros2": {"logs"}, "pynmea2": {"logs"},
     "rosbags": {"logs"}, "rerun": {"logs", "report"}, "ray": {"training"},
     "matplotlib": {"report"}, "jinja2": {"report"}, "typer": {"cli"}, "pickle": set(),
-    "torch": {"training", "shiplog.models.feedforward"},
+    "torch": {"training", "shiplog.models.feedforward"}, "pymavlink": {"logs"},
 }  # fmt: skip
 
 
@@ -139,7 +139,8 @@ def test_commands_that_need_no_network_do_not_load_torch():
     arguments are checked."""
     program = (
         "import sys, shiplog.cli; from shiplog.commands import convert, prepare, train; "
-        "sys.exit(any(name in sys.modules for name in ('torch', 'rerun', 'jax')))"
+        "sys.exit(any(name in sys.modules for name in ('torch', 'rerun', 'jax', "
+        "'pymavlink', 'nmea2000', 'pyulog', 'h5py', 'fastexcel')))"
     )
     assert subprocess.run([sys.executable, "-c", program], cwd=ROOT, check=False).returncode == 0
 

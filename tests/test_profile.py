@@ -153,6 +153,12 @@ direction_deg = 10.0
 diameter_m = 0.1
 area_m2 = 0.01
 span_m = 0.1
+[[actuators]]
+name = "shaft"
+kind = "propeller"
+topic = "/s"
+field = "rpm"
+gear_ratio = 2.0
 [table]
 v = { channel = "sog", sign = 2.0, offset = 1.0, missing = [102.3] }
 """

@@ -32,7 +32,7 @@ def convert(
     ] = None,
     json_to: JsonOption = None,
 ) -> None:
-    """Tables, NMEA 0183 text, Signal K logs and ROS bags to MCAP logs.
+    """Recorders' files, tables, text and ROS bags to MCAP logs.
 
     Example: shiplog convert tables/*.parquet --profile esso-osaka --out logs
     """

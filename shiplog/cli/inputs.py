@@ -16,7 +16,7 @@ def check_paths(logs: Sequence[Path], profile: str | None) -> None:
         profiles.load(profile)
     if not any(log.exists() for log in logs):
         raise LogUnreadable(
-            f"{logs[0]} does not exist.", hint="give the path of an MCAP log, or a folder of them."
+            f"{logs[0]} does not exist.", hint="give the path of a log, or a folder of them."
         )
 
 

@@ -40,7 +40,12 @@ def _window(text: str) -> str:
     return text
 
 
-Logs = Annotated[list[Path], typer.Argument(help="MCAP logs, or folders of them.")]
+Logs = Annotated[
+    list[Path],
+    typer.Argument(
+        help="MCAP logs, recorders' files, all else that `convert` takes, or folders of them."
+    ),
+]
 StoreOption = Annotated[Path, typer.Option("--store", help="Folder of ingested voyages.")]
 ProfileOption = Annotated[
     str | None,

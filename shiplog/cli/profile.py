@@ -13,7 +13,8 @@ from shiplog.cli.output import answer
 
 def profile(
     log: Annotated[
-        Path, typer.Argument(help="A log, table, folder of tables, NMEA text or bag of some ship.")
+        Path,
+        typer.Argument(help="A log, recorder's file, table, folder of tables or bag of a ship."),
     ],
     out: Annotated[Path | None, typer.Option(help="Write the draft here, not to stdout.")] = None,
     vessel: Annotated[

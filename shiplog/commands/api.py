@@ -60,7 +60,7 @@ def ingest(
     profile: str | Path | None = None,
     correct: bool = False,
 ) -> Ingested:
-    """MCAP logs, or folders of them, into a store: a 10 Hz table a voyage, its faults marked.
+    """Logs, recorders' files, or folders of them, into a store: a 10 Hz table a voyage.
 
     profile   a shipped profile's name or a TOML's path; found by the log's topics unless given
     correct   also correct each fault of a sensor that the other sensors make certain
@@ -79,7 +79,7 @@ def ingest(
 def convert(
     sources: Paths, out: str | Path = "logs", *, profile: str | Path | None = None
 ) -> Converted:
-    """Tables, NMEA 0183 text, Signal K logs and ROS bags to MCAP logs in the folder `out`.
+    """Recorders' files, tables, NMEA 0183 text and ROS bags to MCAP logs in the folder `out`.
 
     profile   whose [table] section names a table's columns: a shipped profile's name or a TOML's
               path; NMEA and bags need none

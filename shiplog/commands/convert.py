@@ -1,4 +1,4 @@
-"""Tables, NMEA 0183 text and ROS bags to MCAP logs of the contract."""
+"""Recorders' files, tables, NMEA 0183 text and ROS bags to MCAP logs of the contract."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from shiplog.drafting import facts, guesses
+from shiplog.drafting import facts, guesses, stated
 from shiplog.drafting.guesses import Guess
 from shiplog.exceptions import LogUnreadable, ProfileError
 from shiplog.logs.decoding.fields import is_number
@@ -91,7 +91,8 @@ class Log:
         return int(fewest < 2 or float(np.median(steps)) * 1e-9 > SLOW_S)
 
     def liveliest(self, choices: list[Choice]) -> list[Choice]:
-        """Of topics that may hold a channel those first that live, else in the order they have."""
+        """Of topics that may hold a channel those first that live, of these the one that the
+        recorder itself used, else in the order they have."""
         counts = {one.topic: len(self.times(one.topic)) for one in choices}
         most = max(counts.values(), default=0)
 
@@ -99,7 +100,10 @@ class Log:
             few = counts[one.topic] < FEW and counts[one.topic] * 10 <= most
             return max(self.life(one), int(few))
 
-        return sorted(choices, key=key)
+        def chosen(one: Choice) -> bool:
+            return stated.is_primary(self.said(one.topic))
+
+        return sorted(choices, key=lambda one: (key(one), not chosen(one)))
 
     def describe_change(self, topic: str, path: str) -> str:
         """A line for a value that is sent when it changes: it holds until the next one."""

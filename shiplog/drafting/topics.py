@@ -44,8 +44,6 @@ def draft(path: str | Path, vessel: str | None = None, given: str | None = None)
         for name, found in choices.items()
     }
     choices = {name: log.liveliest(found) for name, found in choices.items()}
-    for found in choices.values():  # the recorder's own word counts most
-        found.sort(key=lambda one: not stated.is_primary(log.said(one.topic)))
     best = [found[0] for found in choices.values() if found]
     driven = _actuators(log, {choice.topic for choice in best})
     parts = [_ship(log.contents, given, any(stated.actuator(log.said(one[1])) for one in driven))]

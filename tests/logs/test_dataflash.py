@@ -388,6 +388,30 @@ def test_what_a_log_lacks_is_said_with_what_to_record(tmp_path):
     assert "No heading was recognised; a voyage needs it" in draft(tmp_path / "alone.BIN")
 
 
+def test_a_heading_that_stands_still_is_not_drafted_before_a_real_one(tmp_path):
+    """ATT without a compass, and a receiver with two antennas."""
+    week, ms = gps_time(START)
+    data = header(("GPS", "ATT"))
+    for i in range(80):
+        at = 200_000 * i
+        data += record("GPS", at, 0, 3, ms + 200 * i, week, 9, 65, 560_000_000 + 90 * i,
+                       120_000_000, 0, 1.0, 5.0, 0.0, 10.0 + 0.5 * i, 1)  # fmt: skip
+        data += record("ATT", at, 0, 0, 0, 0, 0, 0.0, 3)
+    (tmp_path / "two.BIN").write_bytes(data)
+    text = draft(tmp_path / "two.BIN")
+    assert 'topic = "/gnss/heading"' in text.split("[sensors.heading]")[1].split("#")[0]
+
+
+def test_outputs_that_pass_the_sticks_through_are_named(tmp_path):
+    data = header(("RCOU", "PARM", "ATT")) + record("PARM", 0, "SERVO1_FUNCTION", 1.0, 0.0)
+    data += record("PARM", 0, "SERVO3_FUNCTION", 59.0, 0.0)
+    data += record("ATT", 5, 0, 0, 0, 0, 0, 1.0, 3)
+    data += b"".join(record("RCOU", 1000 * i, *(1500 + i,) * 14) for i in range(9))
+    (tmp_path / "sticks.BIN").write_bytes(data)
+    said = [one.sentence for one in read_dataflash(tmp_path / "sticks.BIN").findings]
+    assert any("SERVO1_FUNCTION 1, SERVO3_FUNCTION 59" in one for one in said)
+
+
 # --- damage -------------------------------------------------------------------------------------
 
 

@@ -328,3 +328,10 @@ def test_a_bus_of_something_else_says_what_to_log(tmp_path):
     with pytest.raises(ChannelMissing) as refused:
         read_nmea2000(written(tmp_path, n2k.candump_l(tanks)))
     assert "127505 (601)" in refused.value.message and "127245 (rudder)" in refused.value.hint
+
+
+def test_three_columns_of_whole_numbers_are_no_bus(tmp_path):
+    (tmp_path / "table.txt").write_text(
+        "".join(f"{10000 + k} {20000 + k} 3040\n" for k in range(9))
+    )
+    assert formats.recognise(tmp_path / "table.txt").name == "CSV or Parquet tables"

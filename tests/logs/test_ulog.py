@@ -187,6 +187,31 @@ def test_padding_at_the_end_may_be_there_or_not(tmp_path, flight):
             np.testing.assert_array_equal(column, other.columns[name])
 
 
+def test_blocks_of_any_length_hold_the_same_samples(flight, monkeypatch):
+    from shiplog.logs.conversion import ulog_messages as reader
+
+    whole = read_messages(flight, ulog.FORMATS)
+    for size in (157, 4096):
+        monkeypatch.setattr(reader, "BLOCK_BYTES", size)
+        parts = read_messages(flight, ulog.FORMATS)
+        assert (parts.messages, parts.cut, parts.skipped) == (whole.messages, 0, 0)
+        assert {k: len(v) for k, v in parts.topics.items()} == {
+            k: len(v) for k, v in whole.topics.items()
+        }
+
+
+def test_damage_in_the_middle_costs_what_is_before_the_next_sync(tmp_path, flight):
+    raw = bytearray(flight.read_bytes())
+    middle = len(raw) // 2
+    sync = b"\x08\x00S\x2f\x73\x13\x20\x25\x0c\xbb\x12"
+    cut = raw.find(b"\x1e\x00D\x02\x00", middle)  # a sample of the angular velocity begins here
+    assert cut > 0
+    damaged = raw[:cut] + b"\xee" * 50 + sync + raw[cut:]
+    (tmp_path / "hole.ulg").write_bytes(damaged)
+    whole, found = (read_messages(p, ulog.FORMATS) for p in (flight, tmp_path / "hole.ulg"))
+    assert found.skipped == 50 and found.messages == whole.messages + 1
+
+
 def test_appended_parts_are_read_by_their_offsets(tmp_path):
     """A crash dump behind a message that was cut off."""
     name, fields = "vehicle_attitude", ulog.FORMATS["vehicle_attitude"]

@@ -8,7 +8,6 @@ one in use has the plain name, the others a number.
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -24,8 +23,6 @@ from shiplog.logs.conversion.servo_outputs import Output
 from shiplog.logs.conversion.write import Series
 from shiplog.logs.health.health_report import Finding
 from shiplog.nomenclature.numbers import counted
-
-log = logging.getLogger(__name__)
 
 START = b"\xa3\x95"  # the head of the first record, the format of formats
 SECONDS = {  # a message, and what older logs call the second and third instrument of it
@@ -74,9 +71,8 @@ def read_dataflash(path: Path) -> Recording:
             f"{listed(WANTED, most=len(WANTED))}.",
             hint="set LOG_BITMASK so that GPS, ATT, IMU and RCOU are logged.",
         )
-    if others:
-        log.info("%s: outputs that move no ship are not used: %s", path.name, listed(others))
     findings = clock.findings(path.name) + _of_status(fixes)
+    findings += servo_outputs.unused(others, path.name, bool(driven))
     lost = _lost(flash)
     findings += [Finding("truncated", "log", sentence) for sentence in lost]
     return Recording(sorted(series, key=lambda one: one.topic), findings, lost, RECORD)

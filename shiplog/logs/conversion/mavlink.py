@@ -7,7 +7,6 @@ other. The vehicle is the system that sends most of its motion; others keep thei
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,8 +29,6 @@ from shiplog.logs.conversion.write import Series
 from shiplog.logs.health.health_report import Finding
 from shiplog.nomenclature.numbers import counted
 from shiplog.nomenclature.units import YEAR_2000_NS
-
-log = logging.getLogger(__name__)
 
 WHAT = "a MAVLink telemetry log"
 DIALECT = "pymavlink.dialects.v20.ardupilotmega"
@@ -106,7 +103,8 @@ def read_telemetry(path: Path) -> Recording:
     for rank, system in enumerate(systems):
         vehicle = _vehicle(found, system)
         begin = "" if rank == 0 else f"/vehicle_{system}"
-        series += [one if not begin else _under(one, begin) for one in _topics(vehicle, path.name)]
+        mine = _topics(vehicle, path.name, findings if rank == 0 else [])
+        series += [_under(one, begin) if begin else one for one in mine]
         if all(clock.ahead_ns is None for clock in vehicle.clocks):
             findings += vehicle.clocks[0].findings(f"The vehicle {system} in {path.name}")
     findings += _said(found, systems)
@@ -172,7 +170,7 @@ def _since_boot(own: Mapping[str, Messages]) -> tuple[np.ndarray, np.ndarray]:
     return received[order], boot[order]
 
 
-def _topics(vehicle: _Vehicle, name: str) -> list[Series]:
+def _topics(vehicle: _Vehicle, name: str, findings: list[Finding]) -> list[Series]:
     series: list[Series] = []
     for number, kind in enumerate(RECEIVERS, 1):
         if kind in vehicle.messages:
@@ -192,7 +190,7 @@ def _topics(vehicle: _Vehicle, name: str) -> list[Series]:
             "direction_deg": one.rows["direction"].astype(float) % 360.0,
         }
         series.append(Series("/wind/true_north", "shiplog.Wind", vehicle.time(one), columns))
-    return series + _driven(vehicle, name)
+    return series + _driven(vehicle, name, findings)
 
 
 def _receiver(vehicle: _Vehicle, one: Messages, number: int) -> list[Series]:
@@ -250,7 +248,7 @@ def _estimate(vehicle: _Vehicle, one: Messages) -> list[Series]:
     return found
 
 
-def _driven(vehicle: _Vehicle, name: str) -> list[Series]:
+def _driven(vehicle: _Vehicle, name: str, findings: list[Finding]) -> list[Series]:
     """The outputs, by the parameters that the ground station read."""
     one = vehicle.messages.get("SERVO_OUTPUT_RAW")
     if one is None:
@@ -263,8 +261,7 @@ def _driven(vehicle: _Vehicle, name: str) -> list[Series]:
         for label in labels
     ]
     series, others = servo_outputs.topics(outputs, time, time, _parameters(vehicle))
-    if others:
-        log.info("%s: outputs that move no ship are not used: %s", name, ", ".join(others))
+    findings += servo_outputs.unused(others, name, bool(series))
     return series
 
 

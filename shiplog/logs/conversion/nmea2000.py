@@ -21,6 +21,7 @@ from shiplog.logs.conversion.nmea2000_lines import (
     lines_of,
     notation_of,
     read_lines,
+    states_messages,
 )
 from shiplog.logs.conversion.nmea2000_topics import topics_of
 from shiplog.logs.conversion.original import Format
@@ -48,7 +49,9 @@ def is_nmea2000(path: Path) -> bool:
         start = stream.read(LOOKED_AT_BYTES)
     if b"\0" in start[:1024].lstrip(b"\0"):
         return False
-    return notation_of(_first(start.decode("latin-1").splitlines()), LINE_SHARE) is not None
+    first = _first(lines_of(start.decode("latin-1").splitlines()))
+    notation = notation_of(first, LINE_SHARE)
+    return notation is not None and states_messages(first, notation, LINE_SHARE)
 
 
 def read_nmea2000(path: Path) -> Recording:

@@ -26,6 +26,7 @@ BLOCK_LINES = 100_000  # read at once
 DAY_NS, IKONVERT_NS = 86_400 * SECOND_NS, 1_000 * SECOND_NS
 LEAST_UNIX_S = 100_000_000  # seconds since 1970; what is less counts from the start of a log
 PDU2 = 240  # PDU formats from there on are to all, and the next byte is a part of the PGN
+PGNS = (59_392, 131_071)  # of NMEA 2000
 FRAME_BYTES = 8
 COMMENTS = ("#", "$", "//", ";")  # beginnings of lines that are no message, such as a status
 
@@ -87,7 +88,7 @@ NOTATIONS = (
     # !PDGY,127257,3,17,255,0.563,AP9/UgAh/v8=: the timer counts to 1000 s
     _notation("iKonvert",
               r"^!PDGY,(?P<pgn>\d+),\d*,(?P<src>\d+),\d*,(?P<s>\d+)(?:\.(?P<part>\d+))?,"
-              r"(?P<data>[A-Za-z0-9+/]+=*)\s*$", coded="base64", wraps_ns=IKONVERT_NS,
+              r"(?P<data>[A-Za-z0-9+/]*=*)\s*$", coded="base64", wraps_ns=IKONVERT_NS,
               frames=False),
 )  # fmt: skip
 
@@ -144,6 +145,14 @@ def notation_of(lines: Iterable[str], share: float) -> Notation | None:
         return None
     best = max(NOTATIONS, key=lambda one: counts[one.name])
     return best if counts[best.name] >= share * filled else None
+
+
+def states_messages(lines: Iterable[str], notation: Notation, share: float) -> bool:
+    """Whether lines that have no stamp, such as three whole numbers, are messages at all: by their
+    PGNs."""
+    table = _parsed(list(lines), notation).filter(pl.col("data").is_not_null())
+    known = table.filter((pl.col("stamp") >= 0) | pl.col("pgn").is_between(*PGNS))
+    return known.height > 0 and known.height >= share * table.height
 
 
 def read_lines(

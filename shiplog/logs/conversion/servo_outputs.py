@@ -6,13 +6,18 @@ gripper's or a camera's, move no ship.
 
 from __future__ import annotations
 
+import logging
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from shiplog.exceptions import listed
 from shiplog.logs.conversion.write import Series
+from shiplog.logs.health.health_report import Finding
+
+log = logging.getLogger(__name__)
 
 HALF_TRAVEL_US = 400.0  # what the unit `pwm` takes as full command
 FUNCTIONS = {  # number: kind, name of the topic, ArduPilot's name
@@ -66,6 +71,20 @@ def topics(
         topic = topic if taken[topic] == 1 else f"{topic}_{taken[topic]}"
         series.append(Series(topic, SCHEMA, time, {FIELD: pulses}, logged, metadata=metadata))
     return series, others
+
+
+def unused(others: list[str], name: str, driven: bool) -> list[Finding]:
+    """What there is to say of outputs that have other functions: a finding where none drives."""
+    if not others:
+        return []
+    if driven:
+        log.info("%s: outputs that move no ship are not used: %s", name, listed(others))
+        return []
+    sentence = (
+        f"No output has a function that moves a ship: {listed(others)}. Outputs that pass the "
+        "pilot's sticks through have none; give them the function of what they drive."
+    )
+    return [Finding("not_available", "actuators", sentence)]
 
 
 def _described(

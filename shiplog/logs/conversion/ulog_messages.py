@@ -13,14 +13,15 @@ import struct
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 MAGIC = b"ULog\x01\x12\x35"
 HEADER_BYTES, HEAD_BYTES, FLAG_BYTES, NUMBER_BYTES = 16, 3, 40, 2
-SAMPLE = ord("D")
-BLOCK_BYTES = 4 << 20  # looked through at once
+SAMPLE, FLAGS = ord("D"), ord("B")
+BLOCK_BYTES = 4 << 20  # read at once
 SYNC = b"\x08\x00S\x2f\x73\x13\x20\x25\x0c\xbb\x12"  # a whole message, to begin again at
 TYPES = {
     "int8_t": "<i1", "uint8_t": "<u1", "int16_t": "<i2", "uint16_t": "<u2", "int32_t": "<i4",
@@ -53,55 +54,67 @@ class ULog:
 
 
 def read_messages(path: Path, wanted: Collection[str]) -> ULog:
-    """All samples of the topics `wanted`, of every instance."""
-    return _Reader(path.read_bytes(), frozenset(wanted)).found
+    """All samples of the topics `wanted`, of every instance, block by block."""
+    with path.open("rb") as stream:
+        return _Reader(stream, path.stat().st_size, frozenset(wanted)).found
 
 
 class _Reader:
     """Samples are most of a file: where one begins is seen by its type, its number and the length
     of its format, for a block at once. Every other message is read by itself."""
 
-    def __init__(self, data: bytes, wanted: frozenset[str]) -> None:
-        self.data, self.raw, self.wanted = data, np.frombuffer(data, np.uint8), wanted
+    def __init__(self, stream: BinaryIO, size: int, wanted: frozenset[str]) -> None:
+        self.data, self.raw, self.wanted = b"", np.zeros(0, np.uint8), wanted
         self.formats: dict[str, str] = {}
         self.named: dict[int, tuple[str, int]] = {}  # number of a subscription → what it is of
-        self.places: dict[tuple[str, int], list[np.ndarray]] = {}  # where samples begin
         self.least = np.full(1 << 16, -1, np.int64)  # number → bytes of a sample, not padded
         self.padded = np.full(1 << 16, -1, np.int64)
+        self.parts: dict[tuple[str, int], list[np.ndarray]] = {}
         self.found = ULog()
-        if len(data) >= HEADER_BYTES:
-            self.found.start_us = int.from_bytes(data[8:16], "little")
+        start = stream.read(HEADER_BYTES + HEAD_BYTES + FLAG_BYTES)
+        if len(start) >= HEADER_BYTES:
+            self.found.start_us = int.from_bytes(start[8:16], "little")
         begin = HEADER_BYTES
-        for end in (*self._appended(), len(data)):
-            self._messages(begin, end, last=end == len(data))
+        for end in (*_appended(start, size), size):
+            self._part(stream, begin, end, last=end == size)
             begin = end
-        self._tables()
+        for key, several in self.parts.items():
+            rows = np.concatenate(several)
+            several.clear()
+            self.found.topics[key] = rows[np.argsort(rows["timestamp"], kind="stable")]
 
-    def _appended(self) -> list[int]:
-        """Offsets of appended parts, in order."""
-        data = self.data
-        if data[HEADER_BYTES + 2 : HEADER_BYTES + 3] != b"B" or len(data) < HEADER_BYTES + 43:
-            return []
-        flags = data[HEADER_BYTES + HEAD_BYTES : HEADER_BYTES + HEAD_BYTES + FLAG_BYTES]
-        offsets = struct.unpack("<3Q", flags[16:40])
-        appended = flags[8] & 1
-        return sorted(o for o in offsets if HEADER_BYTES < o < len(data)) if appended else []
+    def _part(self, stream: BinaryIO, begin: int, end: int, last: bool) -> None:
+        """The messages from one byte of the file to another; what is cut off at the end of a part
+        that another one follows is a crash."""
+        stream.seek(begin)
+        rest = b""
+        while begin < end:
+            block = stream.read(min(BLOCK_BYTES, end - begin))
+            begin = begin + len(block) if block else end
+            self.data = rest + block
+            self.raw = np.frombuffer(self.data, np.uint8)
+            rest = self.data[self._messages(begin == end) :]
+        self.found.cut += len(rest) if last else 0
 
-    def _messages(self, at: int, end: int, last: bool) -> None:
-        """The messages from `at` on."""
-        while at + HEAD_BYTES <= end:
+    def _messages(self, final: bool) -> int:
+        """The messages of a block; how many of its bytes were used. What follows begins the next.
+
+        final  no further block continues the last message
+        """
+        at = 0
+        while at + HEAD_BYTES <= len(self.data):
             before = at
             if self.data[at + 2] == SAMPLE:
-                at = self._samples(at, end, last)
+                at = self._samples(at, final)
             if at == before:
-                at = self._one(at, end, last)
+                at = self._one(at, final)
                 if at == before:
                     break
-        self.found.cut += max(0, end - at) if last else 0
+        return at
 
-    def _samples(self, at: int, end: int, last: bool) -> int:
-        """Samples from `at` on, and what stands between them, for a block; where it stopped."""
-        block = self.raw[at : min(end, at + BLOCK_BYTES)]
+    def _samples(self, at: int, final: bool) -> int:
+        """Samples from `at` on, and what stands between them; where they stopped."""
+        block = self.raw[at:]
         heads = np.flatnonzero(block[2:-2] == SAMPLE)
         sizes = block[heads].astype(np.int64) | block[heads + 1].astype(np.int64) << 8
         numbers = block[heads + 3].astype(np.int64) | block[heads + 4].astype(np.int64) << 8
@@ -121,13 +134,11 @@ class _Reader:
                 keep[until], pos = False, int(heads[until])
                 break
             others = len(self.named)
-            while (
-                not leads[until]
-                and pos + HEAD_BYTES < len(block)
-                and (k >= len(heads) or heads[k] != pos)
-            ):
-                following = self._one(at + pos, end, last) - at
-                if following == pos or following > len(block) or len(self.named) != others:
+            while not leads[until] and pos + HEAD_BYTES < len(block) and (
+                k >= len(heads) or heads[k] != pos
+            ):  # fmt: skip
+                following = self._one(at + pos, final) - at
+                if following == pos or len(self.named) != others:
                     pos, k = following, len(heads)  # look for samples anew from there
                     break
                 pos = following
@@ -135,22 +146,38 @@ class _Reader:
         self.found.messages += int(keep.sum())
         for number in np.flatnonzero(np.bincount(numbers[keep])).tolist():
             if self.named[number][0] in self.wanted:
-                of = heads[keep & (numbers == number)] + at
-                self.places.setdefault(self.named[number], []).append(of)
+                mine = keep & (numbers == number)
+                self._keep(number, heads[mine] + at, sizes[mine])
         return at + pos
 
-    def _one(self, at: int, end: int, last: bool) -> int:
-        """One message; where the next one begins, `at` itself where the last one is cut off."""
+    def _keep(self, number: int, begin: np.ndarray, size: np.ndarray) -> None:
+        """Samples [n] of a subscription; padding at the end may be missing."""
+        dtype = self._dtype(self.named[number][0])
+        assert dtype is not None, number
+        rows = np.zeros(len(begin), dtype)
+        for length in np.flatnonzero(np.bincount(size)).tolist():
+            same = size == length
+            taken = min(length - NUMBER_BYTES, dtype.itemsize)
+            part = np.zeros((int(same.sum()), dtype.itemsize), np.uint8)
+            first = begin[same] + HEAD_BYTES + NUMBER_BYTES
+            part[:, :taken] = sliding_window_view(self.raw, taken)[first]
+            rows[same] = part.view(dtype).reshape(-1)
+        self.parts.setdefault(self.named[number], []).append(rows)
+
+    def _one(self, at: int, final: bool) -> int:
+        """One message; where the next one begins, `at` itself where it is not whole."""
         data = self.data
         size, kind = data[at] | data[at + 1] << 8, data[at + 2]
-        after = at + HEAD_BYTES + size
+        after, end = at + HEAD_BYTES + size, len(data)
+        if kind in KINDS and after > end and not final:
+            return at
         if kind not in KINDS or after > end:
-            following = data.find(SYNC, at + 1, end)
-            if following < 0 and last and kind in KINDS:
-                return at
-            if following >= 0 or last:
-                self.found.skipped += (end if following < 0 else following) - at
-            return end if following < 0 else following
+            following = data.find(SYNC, at + 1)
+            if following < 0 and kind in KINDS:
+                return at  # the last message, cut off
+            following = end if following < 0 else following
+            self.found.skipped += following - at
+            return following
         if kind == SAMPLE:  # of a format or number that nothing describes
             self.found.skipped += after - at
         else:
@@ -181,23 +208,6 @@ class _Reader:
         elif letter == "O" and len(body) >= 2:
             self.found.dropouts.append(int.from_bytes(body[:2], "little"))
 
-    def _tables(self) -> None:
-        """The samples of each topic and instance; several subscriptions of one are joined."""
-        for key, several in self.places.items():
-            dtype = self._dtype(key[0])
-            assert dtype is not None, key
-            begin = np.sort(np.concatenate(several))
-            size = self.raw[begin].astype(np.int64) | self.raw[begin + 1].astype(np.int64) << 8
-            rows = np.zeros(len(begin), dtype)
-            for length in np.flatnonzero(np.bincount(size)).tolist():
-                same = size == length
-                taken = min(length - NUMBER_BYTES, dtype.itemsize)
-                part = np.zeros((int(same.sum()), dtype.itemsize), np.uint8)
-                first = begin[same] + HEAD_BYTES + NUMBER_BYTES
-                part[:, :taken] = sliding_window_view(self.raw, taken)[first]
-                rows[same] = part.view(dtype).reshape(-1)
-            self.found.topics[key] = rows[np.argsort(rows["timestamp"], kind="stable")]
-
     def _dtype(self, name: str) -> np.dtype | None:
         """Fields of a topic; None for one whose format is not there or that has no time."""
         fields = self._fields(name, DEEPEST)
@@ -221,6 +231,15 @@ class _Reader:
                 if inner:
                     fields.append((label, inner, (count,)))
         return fields
+
+
+def _appended(start: bytes, size: int) -> list[int]:
+    """Offsets of appended parts, in order, of the first bytes of a file."""
+    if len(start) < HEADER_BYTES + HEAD_BYTES + FLAG_BYTES or start[HEADER_BYTES + 2] != FLAGS:
+        return []
+    flags = start[HEADER_BYTES + HEAD_BYTES :]
+    offsets = struct.unpack("<3Q", flags[16:40])
+    return sorted(one for one in offsets if HEADER_BYTES < one < size) if flags[8] & 1 else []
 
 
 def _least(dtype: np.dtype) -> int:
