@@ -65,7 +65,11 @@ JUDGEMENTS: dict[str, str] = {
         "insignificant: water whose depth is the same everywhere has no shallowest place. The "
         "model is poor, since the commands are those of Voith Schneider propellers."
     ),
-    "dalian": ("DALIAN"),
+    "dalian": (
+        "Right. The file is one run of four minutes, and 39 s of it are left for a test. What the "
+        "draft guessed of the starboard thruster's sign is wrong, and `ingest` says so once the "
+        "thrusters have places: with the sign turned, L falls from 29518 to 10070."
+    ),
     "aava": (
         "Right. The yacht's rudder and engine are not in the log. Its sensors are compared: the "
         "velocity comes 1.2 s after the position, as a receiver's filter makes it."
