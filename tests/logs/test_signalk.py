@@ -78,6 +78,28 @@ def test_deltas_become_topics(tmp_path, form):
     assert all("127508 battery (60)" in sentence for sentence in n2k)
 
 
+def test_nmea_2000_between_the_deltas_is_read_where_these_say_nothing(tmp_path):
+    """A rudder at 0.1 rad, PGN 127245 (angle in 1e-4 rad, bytes 4 and 5), next to deltas of the
+    rest; and a heading that the deltas have already."""
+    lines = []
+    for t in SECONDS:
+        ms = round((START + t) * 1000)
+        latitude, longitude = where(t)
+        lines.append(f"{ms};I;" + delta(t, {
+            "navigation.position": {"latitude": latitude, "longitude": longitude},
+            "navigation.headingTrue": float(heading(t)) * RADIAN,
+        }))  # fmt: skip
+        lines.append(f"{ms};A;{iso(t)},2,127245,204,255,8,00,f8,ff,7f,e8,03,ff,ff")
+        lines.append(f"{ms};A;{iso(t)},2,127250,204,255,8,ff,00,00,ff,7f,ff,7f,fc")
+    topics, found = read(tmp_path, lines)
+    (rudder_,) = [one for name, one in topics.items() if name.startswith("/rudder")]
+    angle = next(iter(rudder_.columns.values()))
+    np.testing.assert_allclose(np.degrees(0.1), angle, atol=1e-6)
+    assert [name for name in topics if name.startswith("/gyro")] == ["/gyro"]
+    assert late(topics["/gyro"], heading, "heading_deg") < 1e-6
+    assert "not read" not in " ".join(f.sentence for f in found.findings)
+
+
 def test_an_engine_turns_as_its_gear_does_and_without_one_the_draft_asks(tmp_path):
     """Revolutions are those before the gear, in Hz and without a sign."""
     words = {0: "Forward", 20: "Neutral", 30: "Reverse"}
@@ -155,7 +177,7 @@ def test_a_line_that_is_cut_is_damaged_and_nothing_else_is_lost(tmp_path):
 
 def test_a_log_without_the_ship_says_what_it_has(tmp_path):
     n2k = f"1717236000000;A;{iso(0)},2,127250,2,255,8,00,f7,04,ff,7f,ff,ff,ff"
-    with pytest.raises(ChannelMissing, match=r"1 lines of NMEA 2000 are not read: 127250 heading"):
+    with pytest.raises(ChannelMissing, match=r"1 lines of NMEA 2000 are not read, .* 127250 heading"):
         read(tmp_path, [n2k, f"1717236000000;I;{delta(0, {'tanks.fuel.0.level': 0.5})}"])
 
 

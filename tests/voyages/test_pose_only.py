@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from sailing import PROFILE, RADIUS, SPEED, profile, series, write
+from sailing import PROFILE, RADIUS, SPEED, profile, series, stamps, write
 
 from shiplog.logs.conversion.write import Series
 from shiplog.nomenclature.channels import UNUSABLE
@@ -56,6 +56,23 @@ def test_velocities_at_midship_are_the_circles_within_what_is_stated(tmp_path):
         # of a steady motion all rows have one error: three deviations are one chance in 300
         assert np.sqrt(np.mean(off**2)) < 3.0 * stated[name].sigma
     assert stated["surge"].sigma < 0.1 * np.sqrt(2.0) * NOISE_M / 0.2  # of a plain difference
+
+
+def test_samples_at_a_high_rate_are_averaged_and_their_own_noise_is_stated(tmp_path):
+    """At 100 Hz, four at a time: σ of the mean is half that of one."""
+    time = np.arange(0.0, 60.0, 0.01)
+    rng, psi = np.random.default_rng(8), 3.0 + SPEED / RADIUS * np.arange(0.0, 60.0, 0.01)
+    columns = {
+        "x_m": RADIUS * np.sin(psi) + 0.7 * np.cos(psi) + 0.2 * np.sin(psi),
+        "y_m": -RADIUS * np.cos(psi) + 0.7 * np.sin(psi) - 0.2 * np.cos(psi),
+    }
+    parts = noisy(60.0)
+    noisy_columns = {n: v + NOISE_M * rng.normal(size=len(v)) for n, v in columns.items()}
+    parts["/position"] = Series("/position", "test.Position", stamps(time), noisy_columns)
+    found = voyage(tmp_path, parts)
+    stated = {one.channel: one for one in found.report.derived}
+    assert stated["surge"].sample_sigma == pytest.approx(0.01, rel=0.1)  # `sigma` of the profile
+    assert np.abs(usable(found, "surge") - SPEED).max() < 5.0 * stated["surge"].sigma
 
 
 def test_a_gyro_that_is_there_is_read_and_not_derived(tmp_path):

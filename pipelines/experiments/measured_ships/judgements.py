@@ -59,6 +59,22 @@ JUDGEMENTS: dict[str, str] = {
         "Right. The data hold yaw rate, roll, pitch and the rudder in counts without a scale, and "
         "nothing else."
     ),
+    "cybership": (
+        "Right that no cause explains it. Both runs are of one campaign, and nothing is known to "
+        "have changed. The named cause takes 3 % of the error away, which the answer itself calls "
+        "insignificant: water whose depth is the same everywhere has no shallowest place. The "
+        "model is poor, since the commands are those of Voith Schneider propellers."
+    ),
+    "dalian": (
+        "Right. The file is one run of four minutes, and 39 s of it are left for a test. What the "
+        "draft guessed of the starboard thruster's sign is wrong, and `ingest` says so once the "
+        "thrusters have places: with the sign turned, L falls from 29518 to 10070."
+    ),
+    "aava": (
+        "Right. The yacht's rudder and engine are not in the log. Its sensors are compared: the "
+        "velocity comes 1.2 s after the position, as a receiver's filter makes it."
+    ),
+    "merrimac": ("Right. A yacht at its berth shows nothing but its instruments' noise."),
     "mcap, location": (
         "Right. The log holds a position and a sensor, and no vehicle that is steered."
     ),

@@ -40,8 +40,8 @@ field = "heading_deg"
 unit = "deg"
 """
 
-# CyberShip Enterprise I: what `cybership` found of its rows. The places are those of the basin's
-# documents, to a centimetre; the two propellers are abaft midship, the bow thruster ahead of it.
+# CyberShip Enterprise I: what `cybership` found of its rows. The places are about those that the
+# basin publishes; the two propellers are abaft midship, the bow thruster ahead of it.
 CSE_PLACES = {  # actuator: row, ahead and to starboard of midship [m], direction [deg]
     "port_ahead": (8, -0.46, -0.055, 0.0), "port_athwart": (9, -0.46, -0.055, 90.0),
     "starboard_ahead": (10, -0.46, 0.055, 0.0), "starboard_athwart": (11, -0.46, 0.055, 90.0),
@@ -91,6 +91,13 @@ def _cse() -> dict[str, str]:
         "[table]\n": CSE_TABLE + columns,
     }
 
+
+# The Dalian boat: nothing says how long it is, nor how far apart its two thrusters are.
+THRUSTER = """topic = "/thruster/pwm_{side}"
+field = "command"
+unit = "pwm"
+offset = 1500.0  # CHECK: the neutral pulse
+"""
 
 DATA_SETS: dict[str, DataSet] = {
     "esso-osaka": DataSet(
@@ -190,6 +197,16 @@ DATA_SETS: dict[str, DataSet] = {
         "USV of Dalian, Excel, circles",
         "dalian_usv",
         tables=("*.xlsx",),
+        mended={
+            **{
+                THRUSTER.format(
+                    side=one
+                ): f"{THRUSTER.format(side=one)}position_m = [-0.4, {at}]\n# "
+                for one, at in (("l", -0.2), ("r", 0.2))
+            },
+            # what `ingest` says of the draft's guess, once the thrusters have places
+            'unit = "pwm", sign = -1, offset': 'unit = "pwm", offset',
+        },
         train=("--window", "20", "--unchecked"),
     ),
     "aava": DataSet(

@@ -2,7 +2,8 @@
 
 A delta holds values of paths in SI and radians, by source and time (Signal K 1.7, delta format).
 The server's multiplexed log puts Unix milliseconds and a letter before each line: `N` for NMEA
-0183, `A` for NMEA 2000, others for deltas. NMEA 2000 is not read, but counted by name.
+0183, `A` for NMEA 2000 in canboat's notation, others for deltas. What the server made deltas of
+stands in the log twice: NMEA 0183 counts before them, and NMEA 2000 only for what neither has.
 """
 
 from __future__ import annotations
@@ -13,10 +14,13 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 
 from shiplog.exceptions import ChannelMissing, listed
 from shiplog.logs.conversion.nmea import NmeaLog, read_sentences, text_to_logs
+from shiplog.logs.conversion.nmea2000 import read_bus_lines
+from shiplog.logs.conversion.nmea2000_lines import notation_of
 from shiplog.logs.conversion.nmea_lines import Stamps
 from shiplog.logs.conversion.original import Format
 from shiplog.logs.conversion.signalk_topics import PREFIXES, Values, topics_of, unread
@@ -121,7 +125,7 @@ def read_signalk(path: Path) -> NmeaLog:
     also = _joined(nmea.series, series)
     others = sum(k.used for k in deltas.ships.values()) - kept.used
     _say(path.name, kept, also, others)
-    n2k_findings = _not_read(n2k)
+    n2k_findings = _of_bus(path, n2k, nmea.series)
     if not nmea.series:
         said = " ".join((reason, *(finding.sentence for finding in n2k_findings)))
         raise ChannelMissing(
@@ -187,17 +191,41 @@ def _say(name: str, kept: Values, also: list[str], others: int) -> None:
         log.info("%s: %d values of other ships are not used", name, others)
 
 
-def _not_read(n2k: Counter[int]) -> list[Finding]:
-    """What of the log is NMEA 2000, by name."""
+def _of_bus(path: Path, n2k: Counter[int], series: list[Series]) -> list[Finding]:
+    """Add the topics of NMEA 2000 that neither NMEA 0183 nor a delta has; what was found of them,
+    or, where they say nothing of a ship's motion, which messages there are."""
     if not n2k:
         return []
+    first = list(islice(_bus_lines(path), LOOKED_AT_LINES))
+    notation = notation_of(first, 0.0)
+    try:
+        assert notation is not None, path.name
+        found = read_bus_lines(_bus_lines(path), path.name, notation, first)
+    except ChannelMissing:
+        return _not_read(n2k)
+    if also := _joined(series, found.series):
+        log.info("%s: in NMEA 2000 as well, which is not used of: %s", path.name, listed(also))
+    return found.findings
+
+
+def _bus_lines(path: Path) -> Iterator[str]:
+    with path.open("r", encoding="utf-8", errors="replace") as stream:
+        for line in stream:
+            split = MULTIPLEXED.match(line)
+            text = (split[3] if split else line).strip()
+            if N2K.match(text):
+                yield text
+
+
+def _not_read(n2k: Counter[int]) -> list[Finding]:
+    """What of the log is NMEA 2000, by name."""
     named = ", ".join(
         f"{pgn}{' ' + PGNS[pgn] if pgn in PGNS else ''} ({count})"
         for pgn, count in n2k.most_common(MOST_NAMED)
     )
     more = f" and {len(n2k) - MOST_NAMED} more" if len(n2k) > MOST_NAMED else ""
     sentence = (
-        f"{n2k.total()} lines of NMEA 2000 are not read: {named}{more}. Have the server log its "
-        "deltas to get them."
+        f"{n2k.total()} lines of NMEA 2000 are not read, since none says how a ship moves: "
+        f"{named}{more}."
     )
     return [Finding("dropped", "log", sentence, value=float(n2k.total()))]

@@ -39,6 +39,7 @@ WORST = 3.0  # times the median standard deviation: a velocity less sure than th
 ENDLESS = 1e300  # m: a position does not come round as a heading does
 USUAL = 0.95  # quantile of the speeds: a ship mostly goes no faster,
 UNSEEN = 2.0  # and no more than so many times as far as that while nobody measures
+LEAST_STEP_S = 0.04  # s: a ship does nothing faster; the mean of several samples is as good
 MEAN_S = 1.0  # s, over which the rows of a window are averaged
 
 
@@ -120,8 +121,23 @@ def _rate(
     if len(starts):
         starts[0] = True
     origin = int(times[0])
-    pieces = smooth((at - origin) * 1e-9, value, starts)
-    return _on_grid((times - origin) * 1e-9, pieces, value.dtype, stated)
+    every = max(int(LEAST_STEP_S / samples.period_s), 1)
+    seconds, value, starts = _thinned((at - origin) * 1e-9, value, starts, every)
+    pieces = smooth(seconds, value, starts)
+    return _on_grid((times - origin) * 1e-9, pieces, value.dtype, stated, every)
+
+
+def _thinned(
+    time: np.ndarray, value: np.ndarray, starts: np.ndarray, every: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Means of so many samples in a row, of none across the start of a piece."""
+    if every == 1 or not len(time):
+        return time, value, starts
+    edges = np.flatnonzero(starts)
+    within = np.arange(len(time)) - np.repeat(edges, np.diff(np.append(edges, len(time))))
+    at = np.flatnonzero(within % every == 0)
+    count = np.diff(np.append(at, len(time)))
+    return np.add.reduceat(time, at) / count, np.add.reduceat(value, at) / count, starts[at]
 
 
 def _own(samples: Samples) -> np.ndarray:
@@ -153,8 +169,9 @@ def torn(samples: Samples, value: np.ndarray, period: float | None) -> dict[int,
 
 
 def _on_grid(
-    seconds: np.ndarray, pieces: Sequence[Smoothed], dtype: np.dtype, stated: float
+    seconds: np.ndarray, pieces: Sequence[Smoothed], dtype: np.dtype, stated: float, every: int
 ) -> Rate:
+    """`every`: samples of which one that was smoothed is the mean."""
     value, rate = (np.full(len(seconds), np.nan, dtype) for _ in range(2))
     of_value, of_rate = np.full(len(seconds), np.nan), np.full(len(seconds), np.nan)
     for piece in pieces:
@@ -165,7 +182,7 @@ def _on_grid(
         unsure = of_rate > WORST * float(np.nanmedian(of_rate))
         rate[unsure], of_rate[unsure] = np.nan, np.nan
     first = pieces[0] if pieces else None
-    sigma, jerk = (first.sigma, first.jerk) if first else (0.0, 0.0)
+    sigma, jerk = (first.sigma * math.sqrt(every), first.jerk) if first else (0.0, 0.0)
     slower = max(stated / sigma, 1.0) if sigma > 0.0 else 1.0
     return Rate(value, rate, slower * of_value, slower * of_rate, max(sigma, stated), jerk)
 
