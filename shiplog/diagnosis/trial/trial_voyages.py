@@ -11,6 +11,7 @@ from shiplog.diagnosis.trial.trial import Trial
 from shiplog.exceptions import StoreError
 from shiplog.models import mmg
 from shiplog.models.causes import Cause, Setting, constants_of
+from shiplog.models.causes.environment import to_wall
 from shiplog.models.extended import Extended
 from shiplog.models.mmg import estimate
 from shiplog.models.starting_values import Start
@@ -115,7 +116,9 @@ def setting_of(run: Run, nominal: Record, recorded: Record) -> Setting:
     }  # fmt: skip
     windless = run.profile.has_wind and not ship.wind
     lacking = {f"wind.{k}": v for k, v in estimate.wind(main).items()} if windless else {}
-    return Setting(run.profile, scale, places, spacing, lacking, ship.parts)
+    state = recorded.state[:: max(1, len(recorded) // 4000)]
+    near = to_wall(state, run.profile.site.banks)
+    return Setting(run.profile, scale, places, spacing, lacking, ship.parts, near)
 
 
 def _places(record: Record, count: int) -> tuple[np.ndarray, float]:

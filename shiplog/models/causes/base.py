@@ -55,6 +55,7 @@ class Setting:
     places  [K, 2]  points x₀, y₀ that cover where the ship was, and `spacing` between them [m]
     lacking coefficients of the forces that the model has not, as they are of such a ship
     parts   forces that the model has (mmg.PARTS); None for all that the profile can have
+    to_wall how near midship came to a wall of the profile [m]
     """
 
     profile: Profile
@@ -63,6 +64,7 @@ class Setting:
     spacing: float
     lacking: Mapping[str, float] = field(default_factory=dict)
     parts: tuple[str, ...] | None = None
+    to_wall: float = 0.0
 
     def columns(self, *kinds: str) -> list[int]:
         """Columns of the actuators of these kinds, whose force the model has."""
