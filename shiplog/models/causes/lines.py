@@ -71,8 +71,8 @@ class Line(Cause):
 
     This is a spring of stiffness k to the point x_c + a/k where s is 0, and a pull of constant size
     G to that point where s is 1; near the point the line is slack (`SLACK`). It is linear in a and
-    k where s and l are 0. As k goes to zero, the point goes to infinity, and the pull is a constant a. A
-    rope that stiffens has an s below zero (Faltinsen 1990, Ch. 8).
+    k where s and l are 0. As k goes to zero, the point goes to infinity, and the pull is a constant
+    a. A rope that stiffens has an s below zero (Faltinsen 1990, Ch. 8).
 
     Size: `PULL` each way; a stiffness that changes the pull by as much over r. Where it is made
     fast: anywhere on the length, 0.29 of it in the root mean square.
