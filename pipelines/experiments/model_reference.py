@@ -13,6 +13,7 @@ import numpy as np
 from shiplog.models.causes import CATALOGUE
 from shiplog.models.causes.base import Cause, Parameter
 from shiplog.models.causes.environment import ShallowWater
+from shiplog.models.causes.lines import LEAST_PULL, PULL
 from shiplog.models.causes.steering import RudderOffset
 from shiplog.models.coefficients import ParameterEntry
 from shiplog.models.mmg.parameters import TABLE
@@ -67,7 +68,15 @@ PARAMETERS = {  # as the report prints them
     "wind_speed_scale": "`value` (measured over true)",
 }
 REACH = "of the largest order"
+ON_BOARD = "0.3 of the ship's length off midship"
+LEAST = f"{LEAST_PULL:g} N per kg of the ship"
 WITHOUT_PARAMETERS = {  # numbers that are made for each ship: realistic and practical size
+    "line": (f"{PULL:g} N per kg of the ship, 0.7 of its bend, {ON_BOARD}", LEAST),
+    "tow": (f"{PULL:g} N per kg of the ship, {ON_BOARD}", LEAST),
+    "contact": (
+        "0.01 N per kg of the ship, friction 0.3, reach 0.1 of the ship's length",
+        "0.0005 N per kg of the ship",
+    ),
     "shallow_water": tuple(f"{size:g}" for size in (ShallowWater.realistic, ShallowWater.least)),
     "rudder_offset": tuple(
         f"{np.degrees(size):.3g} deg" for size in (RudderOffset.realistic, RudderOffset.least)

@@ -8,6 +8,7 @@ import pytest
 from cause_ships import BY, CALM, PLACES, TWIN, forces, setting
 
 from shiplog.models.causes import CATALOGUE
+from shiplog.models.causes.environment import to_wall
 from shiplog.models.causes.lines import Contact, Line, Tow
 
 OFF = ("propeller", "rudder", "wind")
@@ -61,6 +62,16 @@ def test_where_it_is_made_fast_it_turns_the_ship():
     for ahead in (1.2, -1.4):
         found = added("line", [*numbers[:4], ahead], MIDDLE)
         assert found == pytest.approx([0.5, 1.0, ahead], abs=1e-9)
+
+
+def test_it_pulls_from_where_it_is_made_fast():
+    """Right over its point the ship is pulled by its bow, which is 1.2 m beyond."""
+    k, heading = 0.5, 0.7
+    found = added("line", [0.0, 0.0, k, 0.0, 1.2], MIDDLE, heading)
+    assert found == pytest.approx([-k * 1.2, 0.0, 0.0], abs=1e-9)
+    abeam = at(0.6 * -math.sin(heading), 0.6 * math.cos(heading))  # 0.6 m to starboard of it
+    found = added("line", [0.0, 0.0, k, 0.0, 1.2], abeam, heading)
+    assert found == pytest.approx([-k * 1.2, -k * 0.6, -k * 0.6 * 1.2], abs=1e-9)
 
 
 def test_far_away_its_pull_is_the_same_everywhere_and_bends_nothing():
@@ -182,7 +193,13 @@ def test_a_wall_pushes_no_harder_than_where_it_touches_and_hardly_from_afar():
 
 
 def test_a_ship_that_came_near_no_wall_touched_none():
-    assert "alongside no wall" in (Contact().missing(setting()) or "")
-    assert Contact().missing(setting(TWIN, PLACES + np.array([0.0, 15.0]))) is None
+    """A ship of three metres, 4 m and 2 m from the wall."""
+    track = np.zeros((3, 6))
+    track[:, 2] = 36.0, 30.0, 35.0
+    near = to_wall(track, TWIN.site.banks)
+    assert near == pytest.approx(WALL - 36.0, rel=1e-3)
+    assert "alongside no wall" in (Contact().missing(replace(setting(), to_wall=near)) or "")
+    assert Contact().missing(replace(setting(), to_wall=2.0)) is None
+    assert to_wall(track, ()) == math.inf
     shown = Contact().on(setting()).displayed(np.array([3.0, 0.2, 0.0]))
     assert shown["reach"] == (pytest.approx(0.1 * LENGTH), "m")

@@ -32,12 +32,11 @@ def test_what_a_ferry_cannot_be_asked(cause):
     """No rudder, no wind sensor, no gyro, no chart: those causes say why; the others are tested.
     What turns its thrusters may be late or misaligned as a rudder may."""
     output = cause.missing(setting(FERRY))
-    near = PLACES + np.array([0.0, 15.0])  # alongside the wall that its chart shows
     if cause.label not in MISSING:
         assert output is None
     else:
         assert output is not None and MISSING[cause.label] in output
-    assert cause.missing(setting(SINGLE if "over ground" in (output or "") else TWIN, near)) is None
+    assert cause.missing(setting(SINGLE if "over ground" in (output or "") else TWIN)) is None
 
 
 def test_a_ship_without_screw_has_no_thrust_to_lose():
@@ -55,7 +54,7 @@ def of_its_size(profile: Profile) -> Setting:
     scale = {"speed": 0.2 * main.length / 3.0, "length": main.length, "mass": main.mass,
              "moment": main.mass * main.length}  # fmt: skip
     return Setting(profile, scale, PLACES * main.length / 3.0, 8.0 * main.length / 3.0,
-                   parts=ship.parts)  # fmt: skip
+                   parts=ship.parts, to_wall=7.0 * main.length)  # fmt: skip
 
 
 def driven_hard(profile: Profile, scale) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

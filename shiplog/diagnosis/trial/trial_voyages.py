@@ -11,6 +11,7 @@ from shiplog.diagnosis.trial.trial import Trial
 from shiplog.exceptions import StoreError
 from shiplog.models import mmg
 from shiplog.models.causes import Cause, Orders, Setting, constants_of
+from shiplog.models.causes.environment import to_wall
 from shiplog.models.extended import Extended
 from shiplog.models.mmg import estimate
 from shiplog.models.starting_values import Start
@@ -115,8 +116,10 @@ def setting_of(run: Run, nominal: Record, recorded: Record) -> Setting:
     }  # fmt: skip
     windless = run.profile.has_wind and not ship.wind
     lacking = {f"wind.{k}": v for k, v in estimate.wind(main).items()} if windless else {}
+    state = recorded.state[:: max(1, len(recorded) // 4000)]
+    near = to_wall(state, run.profile.site.banks)
     return Setting(
-        run.profile, scale, places, spacing, lacking, ship.parts, Orders.of(recorded)
+        run.profile, scale, places, spacing, lacking, ship.parts, near, Orders.of(recorded)
     )  # fmt: skip
 
 

@@ -17,15 +17,16 @@ HULL = ("fouling", "payload", "cross_flow_drag", "shallow_water", "bank")
 STEERING = ("rudder_force", "rudder_offset", "rudder_lag", "rudder_delay")
 DRIVE = ("thrust_loss", "thrust_drift", "fouling")
 AIR = ("wind_force", "wind_direction_offset", "wind_speed_scale")
+AROUND = ("current", "line", "tow", "contact")
 OF_CHANNELS: Mapping[str, tuple[str, ...]] = {
-    "position": ("current", "antenna_offset", "clock_offset", *HULL, *STEERING, *DRIVE),
-    "velocity": ("current", "antenna_offset", "clock_offset", *HULL, *STEERING, *DRIVE),
-    "heading": ("heading_offset", "current", "clock_offset", *HULL, *STEERING, *DRIVE, *AIR),
+    "position": (*AROUND, "antenna_offset", "clock_offset", *HULL, *STEERING, *DRIVE),
+    "velocity": (*AROUND, "antenna_offset", "clock_offset", *HULL, *STEERING, *DRIVE),
+    "heading": ("heading_offset", "clock_offset", *AROUND, *HULL, *STEERING, *DRIVE, *AIR),
     "yaw_rate": ("yaw_rate_bias", "yaw_rate_scale", "clock_offset", *HULL, *STEERING),
     "wind": (*AIR, "clock_offset"),
     "rudder": (*STEERING, "antenna_offset", "payload", "cross_flow_drag"),
-    "propeller": (*DRIVE, "rudder_force", "current"),
-    "thruster": (*DRIVE, *STEERING, "current"),
+    "propeller": (*DRIVE, "rudder_force", *AROUND),
+    "thruster": (*DRIVE, *STEERING, *AROUND),
     "azimuth": (*STEERING, *DRIVE),
 }
 OF_COLUMNS = {"x0": "position", "y0": "position", "surge": "velocity", "sway": "velocity",

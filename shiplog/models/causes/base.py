@@ -76,6 +76,7 @@ class Setting:
     places  [K, 2]  points x₀, y₀ that cover where the ship was, and `spacing` between them [m]
     lacking coefficients of the forces that the model has not, as they are of such a ship
     parts   forces that the model has (mmg.PARTS); None for all that the profile can have
+    to_wall how near midship came to a wall of the profile [m]
     orders  what was recorded of the actuators; None where that is not known
     """
 
@@ -85,6 +86,7 @@ class Setting:
     spacing: float
     lacking: Mapping[str, float] = field(default_factory=dict)
     parts: tuple[str, ...] | None = None
+    to_wall: float = 0.0
     orders: Orders | None = None
 
     def extent(self, column: int) -> float:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -341,6 +342,14 @@ def nearest_points(state: Any, lines: Any) -> tuple[Any, Any]:
     part = ((here - a) * along).sum(-1) / (along**2).sum(-1)
     to = a + jnp.clip(part, 0.0, 1.0)[..., None] * along - here
     return to, jnp.sqrt((to**2).sum(-1) + 1e-6)
+
+
+def to_wall(state: np.ndarray, banks: Sequence[Sequence[tuple[float, float]]]) -> float:
+    """How near midship came to a wall [m], in states [n, 6]; infinite without one."""
+    lines = [[*a, *b] for bank in banks for a, b in pairwise(bank)]
+    if not lines or not len(state):
+        return math.inf
+    return float(nearest_points(state, np.array(lines))[1].min())
 
 
 def nearest_share(distance: Any, same: Any) -> Any:

@@ -40,9 +40,9 @@ DOUBT = 0.05  # share of the draws that may lie beyond FAR, for a point to be a 
 _POSITION = Parameter("position", "m", 0.3, 0.05, of="length", low=-0.6, high=0.6)
 
 
-def _on_board(north: Any, east: Any, heading: Any, ahead: Any) -> Any:
-    """X, Y, N [..., 3] of a force in earth axes that acts so far `ahead` of midship."""
-    c, s = jnp.cos(heading), jnp.sin(heading)
+def _on_board(north: Any, east: Any, c: Any, s: Any, ahead: Any) -> Any:
+    """X, Y, N [..., 3] of a force in earth axes that acts so far `ahead` of midship; `c` and `s`
+    are of the heading."""
     across = c * east - s * north
     return jnp.stack((c * north + s * east, across, ahead * across), -1)
 
@@ -63,16 +63,16 @@ def _made_fast(at: ParameterEstimate) -> str:
 class Line(Cause):
     """A line to a point, of an elastic rope to a constant pull.
 
-    With x_c the middle of where the ship was, r how far it went from there (root mean square), and
-    the numbers a (2), k, s and l:
+    With x_c the middle of where the ship was, r how far it went from there (root mean square), the
+    bow's direction e, and the numbers a (2), k, s and l:
 
-        g = a - k (x - x_c),   G² = |a|² + k² r²
+        g = a - k (x + l e - x_c),   G² = |a|² + k² r²
         F = g (|g|/G)^-s,   N = l Y
 
     This is a spring of stiffness k to the point x_c + a/k where s is 0, and a pull of constant size
     G to that point where s is 1; near the point the line is slack (`SLACK`). It is linear in a and
-    k where s is 0. As k goes to zero, the point goes to infinity, and the pull is a constant a. A
-    rope that stiffens has an s below zero (Faltinsen 1990, Ch. 8).
+    k where s and l are 0. As k goes to zero, the point goes to infinity, and the pull is a constant
+    a. A rope that stiffens has an s below zero (Faltinsen 1990, Ch. 8).
 
     Size: `PULL` each way; a stiffness that changes the pull by as much over r. Where it is made
     fast: anywhere on the length, 0.29 of it in the root mean square.
@@ -145,12 +145,13 @@ class Line(Cause):
     def force(self, p: Any, state: Any, at: dict) -> Any:
         x, y, reach, little = (at["line.place"][i] for i in range(4))
         north, east, k, bend, ahead = p
-        to_north = north - k * (state[..., 0] - x)
-        to_east = east - k * (state[..., 2] - y)
+        c, s = jnp.cos(state[..., 4]), jnp.sin(state[..., 4])
+        to_north = north - k * (state[..., 0] + ahead * c - x)
+        to_east = east - k * (state[..., 2] + ahead * s - y)
         typical = north * north + east * east + (k * reach) ** 2 + little * little
         here = to_north * to_north + to_east * to_east + SLACK**2 * typical
         bent = jnp.exp(-0.5 * bend * jnp.log(here / typical))
-        return _on_board(bent * to_north, bent * to_east, state[..., 4], ahead)
+        return _on_board(bent * to_north, bent * to_east, c, s, ahead)
 
     def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
         north, east, k, bend, ahead = np.moveaxis(np.asarray(p, dtype=float), -1, 0)
@@ -263,11 +264,12 @@ class Tow(Cause):
         return super().compatible(label) and label != "line"
 
     def force(self, p: Any, state: Any, at: dict) -> Any:
-        c, s = jnp.cos(math.pi * at["share"]), jnp.sin(math.pi * at["share"])
-        begin, middle, end = 0.5 * (1.0 + c - s), s, 0.5 * (1.0 - c - s)
+        cos, sin = jnp.cos(math.pi * at["share"]), jnp.sin(math.pi * at["share"])
+        begin, middle, end = 0.5 * (1.0 + cos - sin), sin, 0.5 * (1.0 - cos - sin)
         north = begin * p[0] + middle * p[2] + end * p[4]
         east = begin * p[1] + middle * p[3] + end * p[5]
-        return _on_board(north, east, state[..., 4], p[6])
+        c, s = jnp.cos(state[..., 4]), jnp.sin(state[..., 4])
+        return _on_board(north, east, c, s, p[6])
 
     def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
         north, east, way = self._nodes(p)
@@ -363,11 +365,7 @@ class Contact(Cause):
         why = super().missing(setting)
         if why is not None:
             return why
-        state = np.zeros((len(setting.places), 6))
-        state[:, [0, 2]] = setting.places
-        _, distance = nearest_points(state, self.constants(setting)["bank.lines"])
-        nearest = float(distance.min()) - setting.spacing
-        far = nearest > ALONGSIDE * setting.scale["length"]
+        far = setting.to_wall > ALONGSIDE * setting.scale["length"]
         return "the ship was alongside no wall of the profile" if far else None
 
     def constants(self, setting: Setting) -> dict[str, np.ndarray]:
