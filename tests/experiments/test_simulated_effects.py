@@ -138,7 +138,7 @@ def test_a_shoal_adds_drag_and_mass_over_its_crest_and_nothing_far_away():
     force = np.array([2.0, 0.0, 0.0, 0.0])
     for row, hide in zip(out, (Effects(), effects), strict=True):
         h = physics.hidden(hide, (0.0, 1.0), 1.0)
-        physics.rates(numbers, h, at_rest, 0.0, 0.0, np.zeros(3), np.zeros(2), force, 0.0, row)
+        physics.rates(numbers, h, at_rest, 0.0, 0.0, 0.0, np.zeros(3), np.zeros(2), force, 0.0, row)
     mass = ship.mass + ship.added_sway * np.array([1.0, 1.0 + 0.7 * 0.8])
     inertia = ship.inertia * np.array([1.0, 1.0 + 0.2 * 0.8])
     lever = ship.mass * ship.gravity_ahead

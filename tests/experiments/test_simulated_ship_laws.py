@@ -96,7 +96,7 @@ def test_each_term_grows_over_a_shoal_by_its_own_share_and_power():
     at_rest, out = np.zeros(11), np.empty(11)
     at_rest[2] = math.sqrt(3.0)
     force = np.array([2.0, 0.0, 0.0, 0.0])
-    physics.rates(c, h, at_rest, 0.0, 0.0, np.zeros(3), STILL, force, 0.0, out)
+    physics.rates(c, h, at_rest, 0.0, 0.0, 0.0, np.zeros(3), STILL, force, 0.0, out)
     lever = ship.mass * ship.gravity_ahead
     mass = ship.mass + ship.added_sway * more("added_sway")
     inertia = ship.inertia * more("added_inertia")

@@ -103,7 +103,7 @@ def test_a_cause_at_the_wrong_place_is_no_score():
     lost["causes"][0]["parameters"] = {"unit": {"value": "port", "unit": ""}}
     blamed["causes"][0]["parameters"] = {"actuator": {"value": "starboard"}}
     one, other = answer(lost, blamed), answer(lost, named("fouling"))
-    assert scores.group_utility(one) == scores.group_utility(other) == 1.0 - (22 / 2 + 1) / 22
+    assert scores.group_utility(one) == scores.group_utility(other) == 1.0 - (31 / 2 + 1) / 31
     assert scores.isolation([one]) == 0.0 and scores.log_score(one) == math.log(scores.FLOOR)
     blamed["causes"][0]["parameters"] = {"actuator": {"value": "port"}}
     right = answer(lost, blamed)

@@ -6,6 +6,8 @@
     python -m pipelines.experiments.findings wind        FRT-DS-ESSO --out findings
     python -m pipelines.experiments.findings faults      FRT-DS-ESSO --out findings
     python -m pipelines.experiments.findings faults-other OTHER-SHIP --out findings
+    python -m pipelines.experiments.findings actuators-blueboat BLUEBOAT --out findings
+    python -m pipelines.experiments.findings actuators-kvlcc2   KVLCC2   --out findings
     python -m pipelines.experiments.findings milliampere MILLIAMPERE --out findings
     python -m pipelines.experiments.findings kvlcc2      KVLCC2      --out findings
 
@@ -20,12 +22,19 @@ import logging
 from collections.abc import Callable
 from pathlib import Path
 
-from pipelines.experiments.findings import esso_osaka, faults, kvlcc2, milliampere
+from pipelines.experiments.findings import (
+    actuator_faults,
+    esso_osaka,
+    faults,
+    kvlcc2,
+    milliampere,
+)
 
 FINDINGS: dict[str, Callable[[Path, Path], str]] = {
     "sensors": esso_osaka.sensors, "published": esso_osaka.published,
     "refitted": esso_osaka.refitted, "wind": esso_osaka.wind,
     "faults": faults.esso_osaka, "faults-other": faults.other_ship,
+    "actuators-blueboat": actuator_faults.blueboat, "actuators-kvlcc2": actuator_faults.kvlcc2,
     "milliampere": milliampere.milliampere, "kvlcc2": kvlcc2.kvlcc2,
 }  # fmt: skip
 

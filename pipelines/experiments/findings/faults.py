@@ -8,7 +8,7 @@ here from the table alone, and shares nothing with the causes that are to find i
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -31,7 +31,8 @@ Columns = dict[str, np.ndarray]  # of a voyage's table, as they are to become
 DEGREE = np.pi / 180.0
 SHARES = (1.0, 0.3)  # of a size that a yard would find
 # What is written at a share of its size: in the contract's words, and how
-FAULTS: dict[str, tuple[Callable[[float], str], Callable[[Columns, np.ndarray, float], None]]] = {
+Fault = tuple[Callable[[float], str], Callable[[Columns, np.ndarray, float], None]]
+FAULTS: dict[str, Fault] = {
     "none": (lambda s: "", lambda c, t, s: None),
     "heading_offset": (
         lambda s: f"angle {3 * s:.2g} deg", lambda c, t, s: _add(c, "heading", 3.0 * s * DEGREE)),
@@ -72,7 +73,7 @@ def esso_osaka(folder: Path, out: Path) -> str:
     """Two random voyages of 22 minutes together; the six others are the nominal campaign."""
     own = out / "faults"  # with faults written into voyages, no other finding reads this store
     store = trials_store(folder, own)
-    return _table(store, expand([own / "logs"]), "random_*", ESSO_TRIAL, own)
+    return written_table(store, expand([own / "logs"]), "random_*", ESSO_TRIAL, own)
 
 
 def other_ship(folder: Path, out: Path) -> str:
@@ -81,19 +82,20 @@ def other_ship(folder: Path, out: Path) -> str:
     store, logs = Store(out / "other" / "store"), sorted(folder.glob("*.mcap"))
     if not store.entries():
         ingest_logs(logs, str(next(folder.glob("*.toml"))), store)
-    return _table(store, logs, "nominal_*", OTHER_TRIAL, out / "other")
+    return written_table(store, logs, "nominal_*", OTHER_TRIAL, out / "other")
 
 
-def _table(
-    store: Store, logs: Sequence[Path], nominal: str, trial: Sequence[str], out: Path
-) -> str:
+def written_table(
+    store: Store, logs: Sequence[Path], nominal: str, trial: Sequence[str], out: Path,
+    faults: Mapping[str, Fault] = FAULTS,
+) -> str:  # fmt: skip
     """A row a fault and share: what was written, and what was reported of it."""
     of = {path.stem: path for path in logs}
     others = tuple(n for n in store.select([nominal]) if n not in trial and "+" not in n)
     run = physics(store, out / "base", Split(training=others, validation=()))
     profile = store.profile(trial)
     rows = []
-    for fault, (size, write) in FAULTS.items():
+    for fault, (size, write) in faults.items():
         for share in SHARES if fault != "none" else (1.0,):
             label = fault.replace(", ", "-") + ("" if share == 1.0 else f"-{share:g}")
             folder = out / label

@@ -13,6 +13,11 @@ python -m pipelines.experiments.hidden_effects goals --out DIR [--count 20] [--f
     count cases for each row of the goals' table; multiples of 21 meet every cause equally often
 python -m pipelines.experiments.hidden_effects abroad --out DIR [--count 100] [--first-seed 70000]
     ships whose equations are not the home ship's, from pipelines.experiments.other_families
+python -m pipelines.experiments.hidden_effects devices --out DIR [--count 20] [--first-seed 64000]
+python -m pipelines.experiments.hidden_effects devices-abroad --out DIR [--count 120]
+    [--first-seed 74000]
+    the same two with actuators, lines, tows and contact as a third of the cases and more; abroad
+    with two further ships, which heel
     each with --rivals: what simpler methods say of the same trials, too; of cases that were run
     with --keep before, give the command again
 python -m pipelines.experiments.hidden_effects remake DIR [--share]

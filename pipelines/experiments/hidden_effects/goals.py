@@ -7,7 +7,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 
-from pipelines.experiments.hidden_effects.parameters import ABSORBED, OTHER_FORM, SURVIVE
+from pipelines.experiments.hidden_effects.parameters import (
+    ABSORBED,
+    ACTUATORS,
+    LINES,
+    NAMES,
+    OTHER_FORM,
+    SURVIVE,
+)
 from pipelines.experiments.hidden_effects.score import (
     FAILED,
     Answer,
@@ -64,8 +71,9 @@ def alarmed(answer: Answer) -> bool:
 
 
 def outside_found(answer: Answer) -> bool:
-    """Unknown with the right family, or undecided with that as the first or second answer."""
-    return answer.word in ("unknown", "undecided") and answer.found
+    """Unknown with the right family, or undecided with that as the first or second answer; or the
+    name that it has since."""
+    return answer.found
 
 
 def outside_its_group(answer: Answer) -> bool:
@@ -94,27 +102,35 @@ def _remainder(family: str) -> Test:
     return lambda answer: OUTSIDE(answer) and answer.truths == (f"unknown:{family}",)
 
 
-ONE = among("one", full)
+def _of(names: Sequence[str]) -> Test:
+    """One cause of these, of full size."""
+    return lambda answer: among("one", full)(answer) and answer.hidden[0] in names
+
+
+# actuators and lines have rows of their own
+ONE = _of([name for name in NAMES if name not in (*ACTUATORS, *LINES)])
 OUTSIDE = among("outside", full)
 REMAINDERS = (  # of what is outside the catalogue
     "position", "heading", "time", "motion", "controls", "wind", "stochastic", "intermittent",
 )  # fmt: skip
 RATES = (
     Rate("named but wrong, any size", physics, lambda answer: answer.misnamed,
-         (None, 0.015), (None, 0.03)),
+         (None, 0.01), (None, 0.015)),
     Rate("named but wrong, and the truth not among its alternatives", physics, outside_its_group),
     Rate("nothing hidden: any alarm", among("none", seconds=None), alarmed,
-         (None, 0.03), (None, 0.05)),
+         (None, 0.03), (None, 0.03)),
     Rate("nothing hidden: a cause named", among("none", seconds=None),
          lambda answer: bool(answer.named)),
-    Rate("one cause, size 1, 7000 s: named right", ONE, right, (0.96, None), (0.75, None)),
+    Rate("one cause, size 1, 7000 s: named right", ONE, right, (0.97, None), (0.85, None)),
+    Rate("actuators, size 1: named right", _of(ACTUATORS), right, (0.95, None), (0.85, None)),
+    Rate("lines, tows and contact, size 1: named right", _of(LINES), right),
     Rate("the same: right among its alternatives, or undecided and among the first two", ONE,
          lambda answer: answer.found, (0.98, None), (0.90, None)),
     Rate("one cause, size 0.3 to 1, 7000 s", among("one", small), right, (0.90, None)),
     Rate("one cause, size below 0.3, 7000 s", among("one", tiny), right),
     Rate("one cause, size 1, 500 s", among("one", full, 500), right, (0.88, None)),
     Rate("outside, size 1: unknown or undecided, right remainder", OUTSIDE,
-         outside_found, (0.95, None), (0.80, None)),
+         outside_found, (0.95, None), (0.85, None)),
     *(Rate(f"outside, size 1: {name}", _remainder(name), outside_found) for name in REMAINDERS),
     Rate("outside, size below 1", among("outside", lambda answer: not full(answer)),
          outside_found),
@@ -138,8 +154,8 @@ CERTAIN = f"reported with {STATED} or more: right"
 LIMITS: dict[str, tuple[Limits, Limits]] = {  # what is not a share of cases: home, abroad
     INTERVALS: ((0.85, 0.95), (0.80, 0.95)),
     ALL_INTERVALS: (FREE, FREE),
-    CALIBRATION: ((None, 0.04), (None, 0.06)),
-    CERTAIN: ((0.97, None), (0.95, None)),
+    CALIBRATION: ((None, 0.03), (None, 0.05)),
+    CERTAIN: ((0.98, None), (0.95, None)),
 }
 
 

@@ -146,10 +146,20 @@ class Answer:
     def family(self) -> str | None:
         return (self.verdict.get("structure") or {}).get("family")
 
+    @cached_property
+    def named_since(self) -> frozenset[str]:
+        """The causes that by now have a name for what was hidden outside the catalogue."""
+        since = parameters.NAMED_SINCE
+        return frozenset(
+            since[name] for name in self.hidden if self.kind == "outside" and name in since
+        )
+
     @property
     def right(self) -> bool:
         """All of it and nothing else, each at its place; of what no cause has a name for, its
-        family."""
+        family, or the cause that has a name for it since."""
+        if self.kind == "outside" and self.word == "named":
+            return bool(self.named_since) and set(self.named) == self.named_since
         if self.kind == "outside":
             return self.word == "unknown" and self.family == self.key["structure"]["family"]
         if not self.sought:
@@ -170,7 +180,8 @@ class Answer:
     @property
     def misnamed(self) -> bool:
         """A cause is named that is not there, or not at its place."""
-        return not set(self.named) <= set(self.hidden) or bool(self.misplaced)
+        there = {*self.hidden, *self.named_since}
+        return not set(self.named) <= there or bool(self.misplaced)
 
     @property
     def groups(self) -> tuple[frozenset[str], ...]:
@@ -213,7 +224,8 @@ class Answer:
         if self.right:
             return True
         if self.word == "undecided":
-            return frozenset(self.truths) in self.likely
+            either = {frozenset(self.truths), self.named_since} - {frozenset()}
+            return not either.isdisjoint(self.likely)
         return len(self.groups) == len(self.truths) and any(
             all(true in group for true, group in zip(order, self.groups, strict=True))
             for order in itertools.permutations(self.truths)
@@ -263,14 +275,15 @@ class Answer:
         all of that is hidden. Of several first answers, equally probable, it states each.
         """
         if self.word == "named":
-            there = set(self.hidden) - self.misplaced
+            there = {*self.hidden, *self.named_since} - self.misplaced
             stated = [(self.probability(name), name in there) for name in self.named]
         elif self.word == "none" or (self.word == "unknown" and self.family):
             label = "none" if self.word == "none" else f"unknown:{self.family}"
             stated = [(self.probability(label), self.right)]
         else:
             most = max((p for _, p in self.open), default=0.0)
-            stated = [(p, a <= set(self.truths)) for a, p in self.open if p >= most - ALIKE]
+            there = {*self.truths, *self.named_since}
+            stated = [(p, a <= there) for a, p in self.open if p >= most - ALIKE]
         return tuple((p, true) for p, true in stated if p is not None)
 
     @property

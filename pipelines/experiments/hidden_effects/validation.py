@@ -29,7 +29,12 @@ from shiplog.report.evaluation import tables
 
 SHIPMMG = "shipmmg"  # a type of ship of another package, and an MMG too
 PLACES = (goals.SAME, goals.OTHER)
-SUITES = {"goals": goals.SAME, "abroad": goals.OTHER}  # which ships a suite is of
+SUITES = {
+    "goals": goals.SAME,
+    "abroad": goals.OTHER,
+    "devices": goals.SAME,
+    "devices-abroad": goals.OTHER,
+}  # which ships a suite is of
 
 
 class Mixed(ShiplogError):

@@ -20,9 +20,13 @@ from pipelines.experiments.other_families import (
     abkowitz,
     azimuth_ferry,
     catamaran,
+    container,
+    devices,
     linear_dp,
+    naval_vessel,
     shipmmg_kvlcc2,
 )
+from pipelines.experiments.other_families.devices import DEVICES
 from pipelines.experiments.other_families.disturbance import Wind
 from pipelines.experiments.other_families.effects import CATALOGUE, OUTSIDE, Effects, offered
 from pipelines.experiments.other_families.instruments import write_voyage
@@ -37,6 +41,8 @@ FAMILIES: dict[str, Callable[[int], Ship]] = {
     "azimuth_ferry": azimuth_ferry.draw,
     "shipmmg": shipmmg_kvlcc2.draw,
 }
+DRAWN = tuple(FAMILIES)  # of these a seed draws one; those that came later have to be asked for
+FAMILIES |= {"container": container.draw, "naval_vessel": naval_vessel.draw}
 PARTS = (0.13, 0.22, 0.15, 0.26, 0.24)  # of a campaign, its voyages
 SHORT_PARTS = (0.45, 0.55)  # of one shorter than SHORT: one voyage to fit and one to hold out
 SHORT = 1500.0  # s
@@ -106,7 +112,7 @@ def draw(
     Raises ValueError for a family or a cause that there is not, or that this ship does not have.
     """
     if family is None:
-        family = str(stream(seed, "family").choice(list(FAMILIES)))
+        family = str(stream(seed, "family").choice(DRAWN))
     if family not in FAMILIES:
         raise ValueError(f"No family is called {family!r}. There are: {', '.join(FAMILIES)}.")
     ship = FAMILIES[family](seed)
@@ -116,8 +122,11 @@ def draw(
         rng = stream(seed, f"size of {name}")
         drawn = SMALLEST ** rng.uniform(0.0, 1.0)
         large = drawn if size is None else float(size)
-        structure, sized = (None, CATALOGUE[name]) if name in CATALOGUE else OUTSIDE[name]
+        inside = CATALOGUE | DEVICES
+        structure, sized = (None, inside[name]) if name in inside else OUTSIDE[name]
         changes, parameters = sized(stream(seed, f"hidden {name}"), large, ship)
+        if "gear" in changes:
+            changes["gear"] = (*effects.gear, *changes["gear"])
         effects = replace(effects, **changes)
         causes.append(Cause(name.partition(":")[0], large, parameters, structure))
     default = max(CAMPAIGN, LENGTHS * ship.time_unit)
@@ -133,9 +142,10 @@ def draw(
 
 def _given(cause: str, ship: Ship) -> list[str]:
     names = [name for name in cause.split("+") if name != "none"]
-    there = offered(ship)
+    there = (*offered(ship), *devices.offered(ship))
     if unknown := [name for name in names if name not in there]:
-        why = "A ship of this family cannot have" if unknown[0] in (*CATALOGUE, *OUTSIDE) else "No"
+        known = (*CATALOGUE, *OUTSIDE, *DEVICES)
+        why = "A ship of this family cannot have" if unknown[0] in known else "No"
         raise ValueError(f"{why} cause {unknown[0]!r}. It offers: none, {', '.join(there)}.")
     if len({name.partition(":")[0] for name in names}) < len(names):
         raise ValueError(f"{cause!r} hides the same thing twice.")

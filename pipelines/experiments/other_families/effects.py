@@ -15,6 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from pipelines.experiments.other_families.gear import Fault
+from pipelines.experiments.other_families.lines import Contact, Line, Tow
 from pipelines.experiments.other_families.ship import Ship
 from pipelines.experiments.other_families.water import DEEPEST, growth
 
@@ -59,6 +61,13 @@ class Effects:
     couple_from: int = 0
     couple_to: int = 0
     louder: float = 1.0  # process noise over that of an ordinary day
+    # units that do not do as recorded, lines, tows and fenders: `devices` draws them
+    gear: tuple[Fault, ...] = ()
+    exchanged: tuple[int, int] | None = None  # two units, each recorded as the other one
+    line: Line | None = None
+    slow_tow: Tow | None = None
+    contact: Contact | None = None
+    feedback: tuple[int, float] | None = None  # unit, and its feedback minus what it does [rad]
     # instruments
     heading_offset: float = 0.0  # rad
     yaw_rate_bias: float = 0.0  # rad/s

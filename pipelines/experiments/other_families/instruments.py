@@ -57,7 +57,9 @@ def measure(voyage: Voyage, *, seed: int, start: datetime) -> list[Series]:
     if voyage.ship.winds:
         series.append(bridge.wind())
     for column, actuator in enumerate(voyage.ship.actuators):
-        series.append(bridge.actuator(column, actuator))
+        series.append(bridge.actuator(bridge.recorded(column), actuator))
+    if voyage.effects.feedback:
+        series.append(bridge.feedback(*voyage.effects.feedback))
     return series
 
 
@@ -210,6 +212,22 @@ class Bridge:
         return self.series(
             "wind", "/wind/apparent", "shiplog.Wind", times, columns, WIND_RATE, unit="m/s, deg",
             sign="blowing from, clockwise from the bow",
+        )  # fmt: skip
+
+    def recorded(self, column: int) -> int:
+        """The unit whose values this column has: two may be exchanged."""
+        two = self.effects.exchanged or ()
+        return two[1 - two.index(column)] if column in two else column
+
+    def feedback(self, unit: int, off: float) -> Series:
+        """What a feedback that is off says of a unit, next to its order; no profile has it yet."""
+        one = self.ship.actuators[unit]
+        where, schema, name = topic(one)
+        times = self.samples(f"{one.name} feedback", RATE)
+        shown = np.rad2deg(self.true(self.voyage.actuators[:, unit], times) + off)
+        return self.series(
+            f"{one.name} feedback", f"{where}_feedback", schema, times,
+            {name: resolved(shown, 4)}, RATE, unit="deg",
         )  # fmt: skip
 
     def actuator(self, column: int, actuator: Actuator) -> Series:

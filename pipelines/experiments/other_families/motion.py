@@ -25,9 +25,13 @@ from collections import namedtuple
 import numpy as np
 from numba import njit
 
+from pipelines.experiments.other_families.gear import held, remember, sent, slew
+from pipelines.experiments.other_families.lines import add_external
 from pipelines.experiments.other_families.water import bank_force, shallow, wind_force
 
-STATE = 6  # x₀ y₀ ψ u v r; then A recorded actuators, then A after a hidden lag
+# x₀ y₀ ψ u v r; then A recorded actuators, then A after a hidden lag or rate; of a ship that rolls,
+# φ and p last
+STATE = 6
 
 Hidden = namedtuple(
     "Hidden",
@@ -36,7 +40,7 @@ Hidden = namedtuple(
     "fouling cross_flow payload payload_ahead aside "
     "keel slope_half slope_north slope_east slope_towards "
     "bank bank_reach bank_east lag delay limit offset gain drift_start drift_slope "
-    "couple couple_from couple_to device_at",
+    "couple couple_from couple_to device_at gear external share_start share_slope",
 )
 Drive = namedtuple("Drive", "time rate low high steers circular drive")
 
@@ -54,8 +58,11 @@ def _past(track, last, state, column, steps):
 
 
 @njit
-def _acting(h, d, track, row, part, dt, state, acting):
+def acting_of(h, d, track, row, part, dt, state, acting):
     """What the actuators do, of what is recorded: lag, delay, offset, limit, cross-coupling."""
+    if h.gear.wrong:
+        _geared(h, d, track, row, part, dt, state, acting)
+        return
     count = len(acting)
     for j in range(count):
         acting[j] = state[STATE + count + j] if d.steers[j] and h.lag > 0.0 else state[STATE + j]
@@ -71,7 +78,28 @@ def _acting(h, d, track, row, part, dt, state, acting):
 
 
 @njit
-def _environment(h, b, w, state, uw, wind, side, time, out):
+def _geared(h, d, track, row, part, dt, state, acting):
+    """The same where a unit does not do as it is told, in the order that `gear` has."""
+    count, g = len(acting), h.gear
+    campaign = h.share_start + h.share_slope * (row + part) * dt
+    for j in range(count):
+        lagged = (d.steers[j] and h.lag > 0.0) or g.rate[j] < math.inf
+        column = STATE + count + j if lagged else STATE + j
+        acting[j] = state[column] if lagged else sent(g, j, state[column])
+        if d.steers[j]:
+            if h.delay > 0.0:  # a step of play is left out: it is below the delay
+                acting[j] = _past(track, row, state, column, row + part - h.delay / dt)
+            acting[j] += h.offset[j]
+            if h.limit > 0.0:
+                acting[j] = min(max(acting[j], -h.limit), h.limit)
+    if h.couple != 0.0:
+        acting[h.couple_to] += h.couple * state[STATE + h.couple_from]
+    for j in range(count):
+        acting[j] = held(g, j, acting[j], d.circular[j], campaign)
+
+
+@njit
+def add_environment(h, b, w, state, uw, wind, side, time, out):
     """Add to `out`: wind, bank, a line to a buoy, a tow, a thruster that nobody records."""
     psi = state[2]
     cos, sin = math.cos(psi), math.sin(psi)
@@ -92,6 +120,9 @@ def _environment(h, b, w, state, uw, wind, side, time, out):
     out[0] += north * cos + east * sin
     out[1] += -north * sin + east * cos + side
     out[2] += side * h.device_at
+    if h.external.any:
+        campaign = h.share_start + h.share_slope * time
+        add_external(h.external, state[0], state[1], psi, b.breadth, campaign, out)
 
 
 @njit
@@ -113,7 +144,7 @@ def rates(forces, c, b, w, d, h, state, acting, order, wind, push, time, work, o
     for i in range(len(h.gain)):
         gain[i] = h.gain[i] * (1.0 + h.drift_start + h.drift_slope * time)
     forces(c, uw, vw, r, acting, gain, grow, 1.0 + h.cross_flow, h.aside, f)
-    _environment(h, b, w, state, uw, wind, push[0], time, f)
+    add_environment(h, b, w, state, uw, wind, push[0], time, f)
 
     mass = b.mass + h.payload
     moment = b.mass * b.gravity + h.payload * h.payload_ahead
@@ -138,7 +169,12 @@ def rates(forces, c, b, w, d, h, state, acting, order, wind, push, time, work, o
         wanted = min(max(wanted / d.time[j], -d.rate[j]), d.rate[j])
         out[STATE + j] = wanted
         out[STATE + count + j] = wanted
-        if h.lag > 0.0:
+        if h.gear.rate[j] < math.inf or (h.gear.wrong and h.lag > 0.0):
+            wanted = sent(h.gear, j, state[STATE + j]) - state[STATE + count + j]
+            if d.circular[j]:
+                wanted = math.atan2(math.sin(wanted), math.cos(wanted))
+            out[STATE + count + j] = slew(h.gear, j, wanted, h.lag if d.steers[j] else 0.0)
+        elif h.lag > 0.0:
             out[STATE + count + j] = (state[STATE + j] - state[STATE + count + j]) / h.lag
 
 
@@ -160,7 +196,7 @@ def advance(forces, c, b, w, d, h, track, start, steps, dt, order, wind, push):
             part = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
             for j in range(width):
                 state[j] = track[i, j] + (part * dt * k[stage - 1, j] if stage else 0.0)
-            _acting(h, d, track, i, part, dt, state, acting)
+            acting_of(h, d, track, i, part, dt, state, acting)
             half = 2 * i + int(2.0 * part)
             rates(
                 forces, c, b, w, d, h, state, acting, order, wind[half], push[half],
@@ -170,3 +206,5 @@ def advance(forces, c, b, w, d, h, track, start, steps, dt, order, wind, push):
             track[i + 1, j] = track[i, j] + dt / 6.0 * (
                 k[0, j] + 2.0 * k[1, j] + 2.0 * k[2, j] + k[3, j]
             )
+        if h.gear.wrong:
+            remember(h.gear, track[i + 1, STATE:])

@@ -74,18 +74,18 @@ class Operator:
         if self.returning:
             surge = 1.0 if here > 0.9 else self.demand[0]
             to = complex(0.0, MIDDLE * self.ship.radius) - complex(x, y)
-            return self._orders((surge, self._wheel(math.atan2(to.imag, to.real), psi, r), 0.0))
+            return self.orders((surge, self.wheel(math.atan2(to.imag, to.real), psi, r), 0.0))
         if time >= self.until:
             self._draw(time, psi)
         if self.own is not None:
             return self.own
         surge, turn, side = self.demand
         if self.course is not None:
-            turn = self._wheel(self.course, psi, r)
+            turn = self.wheel(self.course, psi, r)
             if self.kick and abs(_wrap(self.course - psi)) < 0.2 * abs(self.kick):
                 self.kick = -self.kick
                 self.course += 2.0 * self.kick
-        return self._orders((surge, turn, side))
+        return self.orders((surge, turn, side))
 
     def _far(self, at: complex) -> float:
         """0 in the middle of the water, 1 at its edge: the circle, or the bank less one length."""
@@ -93,11 +93,11 @@ class Operator:
         middle = MIDDLE * radius
         return max(abs(at - 1j * middle) / (radius + middle), (at.imag - middle) / (bank - middle))
 
-    def _wheel(self, course: float, heading: float, rate: float) -> float:
+    def wheel(self, course: float, heading: float, rate: float) -> float:
         turn = 1.3 * _wrap(course - heading) - 1.2 * rate * self.ship.time_unit
         return HAND * round(min(max(turn, -1.0), 1.0) / HAND)
 
-    def _orders(self, demand: Demand) -> np.ndarray:
+    def orders(self, demand: Demand) -> np.ndarray:
         order = self.ship.mixer(*demand)
         low, high = (
             np.array([getattr(a, k) for a in self.ship.actuators]) for k in ("low", "high")

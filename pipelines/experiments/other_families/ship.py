@@ -118,6 +118,7 @@ class Ship:
     spins: bool = False
     cross_flow: bool = False  # has a drag that grows with the cross flow
     own_motion: Callable[..., Any] | None = None  # a family that integrates by itself
+    roll: Any = None  # `roll.Roll` of a ship that heels; its forces have φ, p and K
 
     @property
     def length(self) -> float:

@@ -18,6 +18,8 @@ import numpy as np
 from scipy.integrate import OdeSolver
 
 from pipelines.experiments.other_families.effects import Effects
+from pipelines.experiments.other_families.gear import gear_of, held, remember, sent
+from pipelines.experiments.other_families.lines import External, add_external, external
 from pipelines.experiments.other_families.ship import (
     Actuator,
     Body,
@@ -128,6 +130,8 @@ def move(
     function = hidden(c, e, e.thrust_drift * campaign[0])
     acting = track[0, 6]
     order = np.zeros(2)
+    gear = _Geared(e)
+    outside = external(e.line, e.slow_tow, e.contact, ship.bank_east)
     for i in range(count - 1):
         time, share = i * STEP, i * STEP / duration
         if e.thrust_drift and i and i % round(REFRESH / STEP) == 0:
@@ -138,6 +142,7 @@ def move(
             wanted = (order[j] - track[i, 6 + j]) / max(one.time, STEP)
             track[i + 1, 6 + j] = track[i, 6 + j] + STEP * min(max(wanted, -one.rate), one.rate)
         behind = _behind(track[: i + 2, 6], i + 0.5 - e.rudder_delay / STEP)
+        behind = gear.told(0, behind)
         angle = behind
         if e.rudder_lag > 0.0:  # in the middle of the step, as all controls
             before = acting
@@ -147,11 +152,35 @@ def move(
         if e.rudder_limit > 0.0:
             angle = min(max(angle, -e.rudder_limit), e.rudder_limit)
         tow = campaign[0] + (campaign[1] - campaign[0]) * share
-        turns = 0.5 * (track[i, 7] + track[i + 1, 7])
+        turns = gear.told(1, 0.5 * (track[i, 7] + track[i + 1, 7]))
+        controls = (gear.does(0, angle, tow), gear.does(1, turns, tow))
+        gear.remember(track[i + 1, 6:])
         track[i + 1, :6] = _step(
-            function, e, track[i, :6], (angle, turns), push[i], side[i], tow, mass, ship
+            function, e, track[i, :6], controls, push[i], side[i], tow, mass, ship, outside
         )
     return track
+
+
+class _Geared:
+    """What `gear` does to the two controls, at this package's step."""
+
+    def __init__(self, e: Effects) -> None:
+        self.gear, self.stood = gear_of(2, e.gear), np.zeros(2)
+
+    def told(self, j: int, order: float) -> float:
+        if not self.gear.wrong:
+            return order
+        most = STEP * self.gear.rate[j]
+        away = sent(self.gear, j, order) - self.stood[j]
+        self.stood[j] += min(max(away, -most), most)
+        return float(self.stood[j])
+
+    def does(self, j: int, value: float, campaign: float) -> float:
+        return held(self.gear, j, value, False, campaign) if self.gear.wrong else value
+
+    def remember(self, orders: np.ndarray) -> None:
+        if self.gear.wrong:
+            remember(self.gear, orders)
 
 
 def _behind(values: np.ndarray, at: float) -> float:
@@ -161,7 +190,9 @@ def _behind(values: np.ndarray, at: float) -> float:
     return float(values[before] * (1.0 - part) + values[min(before + 1, len(values) - 1)] * part)
 
 
-def _step(function, e: Effects, s, controls, push, side, tow, mass, ship: Ship) -> np.ndarray:
+def _step(
+    function, e: Effects, s, controls, push, side, tow, mass, ship: Ship, beyond: External
+) -> np.ndarray:
     """One Runge-Kutta step of [6]; controls are those of the middle of the step."""
 
     def rate(s: np.ndarray) -> np.ndarray:
@@ -176,6 +207,10 @@ def _step(function, e: Effects, s, controls, push, side, tow, mass, ship: Ship) 
             away *= e.tether / math.hypot(abs(away), 0.5 * ship.length)
             north, east = north + away.real, east + away.imag
         outside = (north * cos + east * sin, east * cos - north * sin + side, side * e.device_at)
+        if beyond.any:
+            added = np.array(outside)
+            add_external(beyond, x, y, psi, ship.body.breadth, tow, added)
+            outside = tuple(added)
         more = mass @ outside
         return np.array([
             u * cos - v * sin, u * sin + v * cos, r, f[0] + more[0] + push[0] + r * vc,

@@ -8,9 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from pipelines.experiments.other_families import motion
+from pipelines.experiments.other_families import motion, roll
+from pipelines.experiments.other_families.berthing import Berthing
 from pipelines.experiments.other_families.disturbance import Wind, blow, process_noise
 from pipelines.experiments.other_families.effects import Effects
+from pipelines.experiments.other_families.gear import gear_of
+from pipelines.experiments.other_families.lines import external
 from pipelines.experiments.other_families.operators import MIDDLE, Helm, Operator
 from pipelines.experiments.other_families.ship import Ship
 
@@ -20,7 +23,7 @@ PULSES = (0.4, 1.0)  # of the strongest
 PULSE_LENGTHS, QUIET = (1.0, 4.0), 6.0  # L/U: how long a pulse lasts; mean between two
 
 RUDDER_COEFFICIENTS = (  # of the families with rudders
-    "y_d", "y_ddd", "n_d", "n_ddd", "x_dd", "rudder_lift", "rudder_drag",
+    "y_d", "y_ddd", "n_d", "n_ddd", "x_dd", "rudder_lift", "rudder_drag", "area",
 )  # fmt: skip
 
 Pulse = tuple[float, float, float]  # start [s], length [s], force to starboard [N]
@@ -44,6 +47,7 @@ class Voyage:
     from_ahead: np.ndarray  # m/s, where the apparent wind comes from, at midship
     from_starboard: np.ndarray
     pulses: tuple[Pulse, ...] = ()
+    heel: np.ndarray | None = None  # rad, starboard side down, of a ship that rolls
 
 
 def sail(
@@ -66,7 +70,7 @@ def sail(
     if start is None:
         off = place.uniform(-0.12, 0.12, 2) * ship.radius
         start = (off[0], off[1] + MIDDLE * ship.radius, place.uniform(-np.pi, np.pi), 0, 0, 0)
-    steer = helm or Operator(ship, hand)
+    steer = helm or operator_of(ship, effects, hand)
     pulses = draw_pulses(ship, effects.side_thrust, duration, pulse)
 
     public = ship.own_motion
@@ -99,7 +103,15 @@ def sail(
     return Voyage(
         ship, effects, duration, time, x, y, psi, u, v, r, seen[:, 6 : 6 + count].copy(),
         north * cos + east * sin + u, east * cos - north * sin + v, pulses,
+        seen[:, -2].copy() if ship.roll else None,
     )  # fmt: skip
+
+
+def operator_of(ship: Ship, effects: Effects, rng: np.random.Generator) -> Helm:
+    """Where there is a wall to lean on, one who calls there."""
+    if effects.contact is None:
+        return Operator(ship, rng)
+    return Berthing(ship, rng, lean=0.25 * effects.contact.reach)
 
 
 def _at(track: np.ndarray, step: float, time: np.ndarray) -> np.ndarray:
@@ -117,16 +129,23 @@ def _at(track: np.ndarray, step: float, time: np.ndarray) -> np.ndarray:
 
 def _integrate(ship: Ship, e: Effects, start, rows, steer, air, push, campaign, duration):
     count, step = len(ship.actuators), ship.step
-    track = np.zeros((rows + 1, motion.STATE + 2 * count))
+    track = np.zeros((rows + 1, motion.STATE + 2 * count + (roll.STATES if ship.roll else 0)))
     track[0, :6] = start
     drive = drives_of(ship)
     h, c = hidden_of(ship, e, campaign, duration), with_rudders(ship, e.rudder_force)
     watch = round(WATCH / step)
     for first in range(0, rows, watch):
         order = np.asarray(steer(first * step, track[first].copy()), float)
+        steps = min(watch, rows - first)
+        if ship.roll:
+            roll.advance(
+                ship.forces, c, ship.body, ship.roll, ship.windage, drive, h, track, first, steps,
+                step, order, air, push,
+            )  # fmt: skip
+            continue
         motion.advance(
-            ship.forces, c, ship.body, ship.windage, drive, h, track, first,
-            min(watch, rows - first), step, order, air, push,
+            ship.forces, c, ship.body, ship.windage, drive, h, track, first, steps, step, order,
+            air, push,
         )  # fmt: skip
     return track
 
@@ -171,6 +190,9 @@ def hidden_of(
         limit=e.rudder_limit, offset=offset, gain=gain, drift_start=e.thrust_drift * campaign[0],
         drift_slope=e.thrust_drift * along, couple=e.couple, couple_from=e.couple_from,
         couple_to=e.couple_to, device_at=e.device_at,
+        gear=gear_of(len(ship.actuators), e.gear),
+        external=external(e.line, e.slow_tow, e.contact, ship.bank_east),
+        share_start=campaign[0], share_slope=along,
     )  # fmt: skip
 
 

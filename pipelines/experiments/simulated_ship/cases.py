@@ -20,6 +20,8 @@ from typing import Any
 import numpy as np
 
 from pipelines.experiments.simulated_ship import laws
+from pipelines.experiments.simulated_ship.devices import DEVICES
+from pipelines.experiments.simulated_ship.gear import merged
 from pipelines.experiments.simulated_ship.laws import Laws
 from pipelines.experiments.simulated_ship.sensors import write_voyage
 from pipelines.experiments.simulated_ship.ship import Effects, Ship, varied
@@ -286,8 +288,9 @@ def draw(
     if seconds not in DURATIONS:
         raise ValueError(f"seconds is {seconds}; a trial takes {' or '.join(map(str, DURATIONS))}.")
     names = _names(seed) if cause is None else [n for n in cause.split("+") if n != "none"]
-    if unknown := [name for name in names if name not in CATALOGUE and name not in OUTSIDE]:
-        known = ", ".join(("none", *CATALOGUE, *OUTSIDE))
+    inside = CATALOGUE | DEVICES
+    if unknown := [name for name in names if name not in inside and name not in OUTSIDE]:
+        known = ", ".join(("none", *inside, *OUTSIDE))
         raise ValueError(f"No cause is called {unknown[0]!r}. There are: {known}.")
     if len(set(names)) < len(names):
         raise ValueError(f"{cause!r} hides the same thing twice.")
@@ -301,10 +304,11 @@ def draw(
         rng = _stream(seed, f"size of {name}")
         drawn = SMALLEST ** rng.uniform(0.0, 1.0)
         large = drawn if size is None else float(size)
-        family, sized = (None, CATALOGUE[name]) if name in CATALOGUE else OUTSIDE[name]
+        family, sized = (None, inside[name]) if name in inside else OUTSIDE[name]
         changes, parameters = sized(_stream(seed, name), large)
+        changes = {k: merged(getattr(effects, k), value) for k, value in changes.items()}
         effects = replace(effects, **changes)
-        causes.append(Cause(name, large, parameters, family))
+        causes.append(Cause(name.partition(":")[0], large, parameters, family))
     return Case(
         seed=seed, ship=replace(varied(seed), name=Ship().name),  # its name would tell the seed
         laws=laws.drawn(_stream(seed, "laws")),

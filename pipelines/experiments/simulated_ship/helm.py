@@ -9,7 +9,7 @@ import numpy as np
 
 from pipelines.experiments.simulated_ship.ship import LIMITS
 
-# time [s], state [11] -> port, starboard [rad], propeller [rev/s]; asked once a second
+# time [s], state [12] -> port, starboard [rad], propeller [rev/s]; asked once a second
 Helm = Callable[[float, np.ndarray], tuple[float, float, float]]
 Settings = tuple[float, float, float]  # port [deg], starboard [deg], propeller [rev/s]
 
@@ -101,7 +101,7 @@ class Operator:
             draw, _, shortest, longest = MANOEUVRES[which]
             self.settings = draw(self.rng)
             self.until = time + self.rng.uniform(shortest, longest)
-        return _limited(self.settings)
+        return limited(self.settings)
 
     def _home(
         self, north: float, east: float, heading: float, yaw_rate: float, here: float
@@ -114,10 +114,10 @@ class Operator:
         )  # a hand, no autopilot
         rudder = float(np.clip(rudder, -35.0, 35.0))
         power = 12.5 if here > 36.0 else self.settings[2]
-        return _limited((rudder, rudder, power))
+        return limited((rudder, rudder, power))
 
 
-def _limited(settings: Settings) -> Settings:
+def limited(settings: Settings) -> Settings:
     port, starboard, propeller = LIMITS.values()
     return (
         float(np.clip(np.deg2rad(settings[0]), *port)),

@@ -21,16 +21,25 @@ from dataclasses import fields
 import numpy as np
 from numba import njit
 
+from pipelines.experiments.simulated_ship.gear import (
+    acting,
+    drive,
+    external_of,
+    gear_of,
+    past,
+    pulls,
+    settle,
+)
 from pipelines.experiments.simulated_ship.laws import Laws, force_numbers
 from pipelines.experiments.simulated_ship.place import WATER, bank, grown, powered, shoal
-from pipelines.experiments.simulated_ship.ship import Effects, Ship
+from pipelines.experiments.simulated_ship.ship import BANK_EAST, Effects, Ship
 
 STEP = 0.02  # s; logged at 0.1 s
 AIR = 1.225  # kg/m³
 THRUSTER = 1.3  # m ahead of midship, the one nobody records
 CROSS_FLOW_SPEED = 0.1  # m/s across a strip, as usual: there any power of it is the square
-# state: x₀ u y₀ v ψ r, measured δ_port δ_starboard n, and the rudder angles after a hidden lag
-STATES = 11
+# state: x₀ u y₀ v ψ r, measured δ_port δ_starboard n, and all three after a hidden lag or rate
+STATES = 12
 
 _SHIP = [f.name for f in fields(Ship) if f.name != "name"]
 _FORCES = [
@@ -43,7 +52,7 @@ _FORCES = [
 _DERIVED = ["wind_force_surge", "wind_force_sway", "wind_force_yaw", "drift_start", "drift_slope"]
 _LAWS = list(force_numbers(Laws()))
 Coefficients = namedtuple("Coefficients", _SHIP + _LAWS)
-Hidden = namedtuple("Hidden", _FORCES + _DERIVED)
+Hidden = namedtuple("Hidden", [*_FORCES, *_DERIVED, "gear", "external"])
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 STATIONS = tuple(0.5 * _NODES)  # ξ = x/L, from stern to bow
@@ -60,7 +69,12 @@ def hidden(effects: Effects, campaign: tuple[float, float], duration: float) -> 
     forces = [float(getattr(effects, name)) for name in _FORCES]
     slope = effects.thrust_drift * (campaign[1] - campaign[0]) / duration
     return Hidden(
-        *forces, *map(float, effects.wind_force), effects.thrust_drift * campaign[0], slope
+        *forces,
+        *map(float, effects.wind_force),
+        effects.thrust_drift * campaign[0],
+        slope,
+        gear_of(effects.gear, campaign, duration),
+        external_of(effects.external),
     )
 
 
@@ -237,8 +251,8 @@ def masses(c, h, shallow):
 
 
 @njit
-def rates(c, h, state, port, starboard, order, wind, push, time, out):
-    """dx/dt [11] of `state` [11] into `out`; port and starboard are the rudder angles that act.
+def rates(c, h, state, port, starboard, screw, order, wind, push, time, out):
+    """dx/dt [12] of `state` [12] into `out`; port, starboard and screw are what acts.
 
     wind   [2] where the true wind comes from, north and east [m/s]
     push   [4] side thrust [N], and accelerations that nothing explains [m/s², m/s², rad/s²]
@@ -254,7 +268,7 @@ def rates(c, h, state, port, starboard, order, wind, push, time, out):
 
     shallow = shoal(c, h, state[0], state[2]) if h.shallow_water > 0.0 else 0.0
     x, y, n = hull(c, h, uw, vw, r, shallow)
-    thrust, inflow = propeller(c, uw, vw, r, state[8])
+    thrust, inflow = propeller(c, uw, vw, r, screw)
     weaker = (1.0 - h.thrust_loss) * (1.0 + h.drift_start + h.drift_slope * time)
     thrust *= weaker
     x += thrust * (1.0 - c.deduction)
@@ -273,6 +287,10 @@ def rates(c, h, state, port, starboard, order, wind, push, time, out):
     if h.bank > 0.0:
         bx, by, bn = bank(c, h, state[2], uw, psi)
         x, y, n = x + bx, y + by, n + bn
+    if h.external.any:
+        campaign = h.gear.begin + h.gear.slope * time
+        ex, ey, en = pulls(h.external, BANK_EAST, c.breadth, state[0], state[2], psi, campaign)
+        x, y, n = x + ex, y + ey, n + en
     y += push[0]
     n += push[0] * THRUSTER
 
@@ -295,24 +313,15 @@ def rates(c, h, state, port, starboard, order, wind, push, time, out):
         out[6 + i] = min(max(wanted, -c.rudder_rate), c.rudder_rate)
         lag = h.rudder_lag
         out[9 + i] = (state[6 + i] - state[9 + i]) / lag if lag > 0.0 else out[6 + i]
+        if h.gear.wrong:
+            out[9 + i] = drive(h.gear, i, state[6 + i], state[9 + i], lag)
     out[8] = (order[2] - state[8]) / c.propeller_time
-
-
-@njit
-def _past(track, last, state, column, steps):
-    """`column` of the track at `steps` (may be a fraction) steps, linear in between."""
-    if steps <= 0.0:
-        return track[0, column]
-    if steps >= last:  # within the present step: the stage itself is the newest we have
-        return track[last, column] if steps == last else state[column]
-    before = int(steps)
-    part = steps - before
-    return track[before, column] * (1.0 - part) + track[before + 1, column] * part
+    out[11] = drive(h.gear, 2, state[8], state[11], 0.0) if h.gear.wrong else out[8]
 
 
 @njit
 def advance(c, h, track, start, steps, dt, order, wind, push):
-    """Runge-Kutta of fourth order: rows start+1 .. start+steps of `track` [K, 11].
+    """Runge-Kutta of fourth order: rows start+1 .. start+steps of `track` [K, 12].
 
     order   [3] what the operator has set, held: port, starboard [rad], propeller [rev/s]
     wind    [2K - 1, 2] where the true wind comes from, north and east [m/s], at half steps
@@ -327,20 +336,25 @@ def advance(c, h, track, start, steps, dt, order, wind, push):
                 state[j] = track[i, j] + (part * dt * k[stage - 1, j] if stage else 0.0)
             if h.rudder_delay > 0.0:
                 when = i + part - h.rudder_delay / dt
-                port = _past(track, i, state, 9, when)
-                starboard = _past(track, i, state, 10, when)
+                port = past(track, i, state, 9, when)
+                starboard = past(track, i, state, 10, when)
             else:
                 port, starboard = state[9], state[10]
             port, starboard = port + h.rudder_offset_port, starboard + h.rudder_offset_starboard
             if h.rudder_limit > 0.0:
                 port = min(max(port, -h.rudder_limit), h.rudder_limit)
                 starboard = min(max(starboard, -h.rudder_limit), h.rudder_limit)
+            screw = state[8]
+            if h.gear.wrong:
+                port, starboard, screw = acting(h, track, i, part, dt, state)
             half = 2 * i + int(2.0 * part)
             rates(
-                c, h, state, port, starboard, order, wind[half], push[half], (i + part) * dt,
+                c, h, state, port, starboard, screw, order, wind[half], push[half], (i + part) * dt,
                 k[stage],
             )  # fmt: skip
         for j in range(STATES):
             track[i + 1, j] = track[i, j] + dt / 6.0 * (
                 k[0, j] + 2.0 * k[1, j] + 2.0 * k[2, j] + k[3, j]
             )
+        if h.gear.wrong:
+            settle(h.gear, track[i + 1, 6], track[i + 1, 7], track[i + 1, 8])

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
+from pipelines.experiments.simulated_ship.gear import Faulty
+
 
 @dataclass(frozen=True, slots=True)
 class Ship:
@@ -147,6 +149,8 @@ class Effects:
     propeller_side_force: float = 0.0  # share of the thrust, to starboard, outside the catalogue
     rudder_limit: float = 0.0  # rad, no rudder acts beyond ± this; 0 is no limit; outside too
     side_thrust: float = 0.0  # N, the strongest pulse of a thruster that nobody records
+    gear: tuple[Faulty, ...] = ()  # units that do not do what is recorded
+    external: Mapping[str, float] = field(default_factory=dict)  # lines, tows, fenders: `gear`
     # the instruments
     heading_offset: float = 0.0  # rad, measured minus true
     yaw_rate_bias: float = 0.0  # rad/s, measured minus true

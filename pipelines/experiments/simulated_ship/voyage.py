@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.experiments.simulated_ship import physics
+from pipelines.experiments.simulated_ship.berthing import Berthing
 from pipelines.experiments.simulated_ship.helm import Helm, Operator
 from pipelines.experiments.simulated_ship.laws import Laws
 from pipelines.experiments.simulated_ship.noise import process_noise
@@ -77,7 +78,7 @@ def sail(
     if start is None:
         x0, y0, heading = start_rng.uniform((-8.0, -8.0, -np.pi), (8.0, 8.0, np.pi))
         start = (x0, 0.0, y0, 0.0, heading, 0.0)
-    steer = helm or Operator(helm_rng)
+    steer = helm or operator_of(effects, helm_rng)
 
     kept = round(PERIOD / step)
     rows = round(duration_s / PERIOD) * kept
@@ -97,6 +98,13 @@ def sail(
 
     seen, (from_north, from_east) = track[::kept], air[:: 2 * kept].T
     return _observed(ship, effects, duration_s, seen, from_north, from_east, pulses)
+
+
+def operator_of(effects: Effects, rng: np.random.Generator) -> Helm:
+    """Where the wall has fenders, one who calls there."""
+    if "fender" not in effects.external:
+        return Operator(rng)
+    return Berthing(rng, lean=0.3 * effects.external["reach"])
 
 
 def unexplained(
