@@ -23,12 +23,14 @@ if TYPE_CHECKING:
         diagnose,
         diagnose_list,
         evaluate,
+        find_manoeuvres,
         gate,
         ingest,
         load,
         open_store,
         profile,
         sensors,
+        simulate,
         train,
     )
     from shiplog.commands.compare import Comparison
@@ -40,6 +42,8 @@ if TYPE_CHECKING:
     from shiplog.report.diagnosis.diagnosis import Diagnosis
     from shiplog.report.evaluation.evaluation import Evaluation
     from shiplog.report.fleet.fleet import Fleet
+    from shiplog.report.manoeuvres.sheet import ManoeuvreSheet
+    from shiplog.report.simulation import Simulation
     from shiplog.training.runs.load_model import Run
     from shiplog.voyages.store.store import Store
     from shiplog.voyages.store.voyage import Voyage
@@ -55,9 +59,11 @@ __all__ = [
     "Fleet",
     "Gate",
     "Ingested",
+    "ManoeuvreSheet",
     "Run",
     "SensorComparison",
     "ShiplogError",
+    "Simulation",
     "Store",
     "Voyage",
     "__version__",
@@ -67,12 +73,14 @@ __all__ = [
     "diagnose",
     "diagnose_list",
     "evaluate",
+    "find_manoeuvres",
     "gate",
     "ingest",
     "load",
     "open_store",
     "profile",
     "sensors",
+    "simulate",
     "train",
 ]
 
@@ -86,9 +94,11 @@ _CLASSES = {
     "Fleet": "report.fleet.fleet",
     "Gate": "commands.gate",
     "Ingested": "commands.prepare",
+    "ManoeuvreSheet": "report.manoeuvres.sheet",
     "Run": "training.runs.load_model",
     "SensorComparison": "commands.sensors",
     "ShiplogError": "exceptions",
+    "Simulation": "report.simulation",
     "Store": "voyages.store.store",
     "Voyage": "voyages.store.voyage",
 }

@@ -56,10 +56,10 @@ def manoeuvres(
     ] = None,
     json_to: JsonOption = None,
 ) -> None:
-    """Turns, zigzags, stops, pull-outs and spirals: measured, simulated, and IMO's limits.
+    """Manoeuvres: measured, simulated, and IMO's limits.
 
-    They are found in ordinary logs. Each has its conditions, why it is or is not of the standard,
-    and its quantities with 90 % intervals.
+    Turns, zigzags, stops, pull-outs and spirals are found in ordinary logs. Each has its
+    conditions, why it is or is not of the standard, and its quantities with 90 % intervals.
 
     Example: shiplog manoeuvres runs/mmg --voyages 'trial_*' --report manoeuvres.html
     """

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from shiplog.report.diagnosis.diagnosis import Diagnosis
     from shiplog.report.evaluation.evaluation import Evaluation
     from shiplog.report.fleet.fleet import Fleet
+    from shiplog.report.manoeuvres.sheet import ManoeuvreSheet
+    from shiplog.report.simulation import Simulation
+    from shiplog.simulation.schedules import Manoeuvre
     from shiplog.training.runs.load_model import Run
 
     AnyRun = Run | str | Path
@@ -318,6 +321,73 @@ def gate(
         path, Store(_path(store)), Path(limits), _names(voyages), diagnosis=where,
         cause_files=_files(causes),
     )  # fmt: skip
+
+
+def simulate(
+    run: AnyRun,
+    manoeuvre: Manoeuvre | str | Path,
+    store: AnyStore | None = None,
+    *,
+    speed: float | None = None,
+    wind: tuple[float, float] = (0.0, 0.0),
+    current: tuple[float, float] = (0.0, 0.0),
+    seconds: float | None = None,
+    members: int = 200,
+    seed: int = 0,
+    out: str | Path | None = None,
+    causes: Files = (),
+) -> Simulation:
+    """A run's model on a manoeuvre of `shiplog.simulation.schedules`, on the orders of a CSV file,
+    or, with `store`, on the inputs of the voyage of that name.
+
+    speed     of the approach through the water, m/s; the run's usual one unless given
+    wind      true wind in m/s and where it comes from; `current` and where it sets: deg clockwise
+              from x₀
+    seconds   instead of until the manoeuvre is complete
+    members   of the ensemble, of which the first is the model as it stands; 1 for no other
+    out       .parquet, .csv, .mcap or .rrd
+
+    Raises ShiplogError.
+    """
+    from shiplog.commands import simulate as simulating
+    from shiplog.simulation import schedules
+    from shiplog.simulation.sailing import Water, from_direction
+
+    (path,) = _runs(run)
+    opened = simulating.load(path, _files(causes))
+    to = None if out is None else Path(out)
+    if store is not None:
+        return simulating.simulate_voyage(
+            opened, Store(_path(store)), str(manoeuvre), members=members, seed=seed, out=to
+        )
+    if isinstance(manoeuvre, str | Path):
+        manoeuvre = schedules.read(Path(manoeuvre), opened.profile)
+    water = Water(from_direction(*wind), from_direction(*current))
+    return simulating.simulate_run(
+        opened, manoeuvre, speed=speed, water=water, members=members, seed=seed, seconds=seconds,
+        out=to,
+    )  # fmt: skip
+
+
+def find_manoeuvres(
+    runs: AnyRuns = (),
+    store: AnyStore | None = None,
+    voyages: Names = (),
+    *,
+    scale: float = 1.0,
+    members: int = 100,
+    causes: Files = (),
+) -> ManoeuvreSheet:
+    """Turns, zigzags, stops, pull-outs and spirals of these voyages, all of the store where none
+    is named: measured, and sailed by a run and an extended one. Without `store`, what the runs
+    sail by the book. `scale`: how many times the ship is longer than its model. Raises
+    ShiplogError."""
+    from shiplog.commands import manoeuvres as finding
+
+    where = None if store is None else Store(_path(store))
+    return finding.manoeuvres_of(
+        _runs(runs), where, _names(voyages), _files(causes), scale=scale, members=members
+    )
 
 
 def _path(store: AnyStore) -> Path:

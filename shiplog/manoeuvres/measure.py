@@ -44,7 +44,7 @@ class Measured:
 
 def values(found: Found, track: Track) -> dict[str, float]:
     """Quantities of a manoeuvre on this track in still water."""
-    straight = found.approach is not None and found.approach.straight
+    straight = found.straight
     match found.kind:
         case "turn":
             all_of = turning.quantities(track, found.begin, found.side)

@@ -89,6 +89,10 @@ class Found:
     steps: tuple[tuple[float, float], ...] = ()
 
     @property
+    def straight(self) -> bool:
+        return went_straight(self.track, self.begin, self.approach)
+
+    @property
     def name(self) -> str:
         """As a sheet has it: `turn 35 deg to starboard`, `zigzag 10/10`."""
         degrees = math.degrees(self.angle)
@@ -173,6 +177,16 @@ def approach_of(track: Track, begin: float) -> Approach | None:
     )
 
 
+def went_straight(track: Track, begin: float, before: Approach | None) -> bool:
+    """Whether what follows an order is its doing; of a record that begins with it, by the yaw rate
+    there."""
+    if before is not None:
+        return before.straight
+    row = track.row(begin)
+    length_time = track.length / max(float(track.speed[row]), 1e-3)
+    return bool(abs(track.yaw_rate[row]) * length_time <= COURSE_RATE)
+
+
 def _base(track: Track, before: Hold | None, hold: Hold, length_time: float) -> float:
     """Where the rudder was before it went to a hold: at the hold before, or on average."""
     if before is not None and hold.begin - before.end <= ON_THE_WAY * length_time:
@@ -227,7 +241,7 @@ def _zigzag(
     if track.at(track.state[:, 1], begin) < MOVING * usual:
         return None
     before = approach_of(track, begin)
-    straight = before is not None and before.straight
+    straight = went_straight(track, begin, before)
     at = np.array([track.heading_at(t) for t in orders])
     if not straight and len(at) < 4:
         return None  # few orders out of a turn are steering
@@ -286,7 +300,7 @@ def _turn(voyage: str, track: Track, held: Sequence[Hold], at: int, usual: float
         part = f"{degrees:.0f} deg: it has no steady turn"
     elif turned < math.radians(480.0):
         part = f"{degrees:.0f} deg: no two positions are 360 deg apart, and the current is unknown"
-    if before is None or not before.straight:
+    if not went_straight(track, begin, before):
         part = "it begins out of another turn, and has neither advance nor diameter" + (
             f"; {part}" if part else ""
         )

@@ -11,12 +11,13 @@ import numpy as np
 
 from shiplog.exceptions import ModelError, listed
 from shiplog.manoeuvres import conditions as sailed_in
-from shiplog.manoeuvres import criteria, measure, recognition, simulated, stretches
+from shiplog.manoeuvres import criteria, drift, measure, recognition, simulated, stretches
 from shiplog.manoeuvres.conditions import Conditions
 from shiplog.manoeuvres.criteria import Limit
 from shiplog.manoeuvres.quantity import QUANTITIES, Estimate, Kind
 from shiplog.manoeuvres.recognition import Found
 from shiplog.manoeuvres.simulated import STANDARD, Simulated
+from shiplog.manoeuvres.track import Track
 from shiplog.ship_profile.profile import Profile
 from shiplog.simulation.schedules import Manoeuvre, PullOut, Turn, Zigzag
 from shiplog.training.runs.load_model import Run
@@ -241,12 +242,17 @@ def _recorded(
     cond = sailed_in.of(found, record, profile, covered)
     labels = ("simulated", "extended")
     notes = [f"{label}: {m.note}" for label, m in zip(labels, models, strict=True) if m and m.note]
-    drawn = [_drawn("measured", found.track, found.begin, found.begin)]
-    drawn += [
-        _drawn(label, simulated.track_of(m.sailed, 0, profile), 0.0, 0.0)
-        for label, m in zip(labels, models, strict=True) if m is not None
-    ]  # fmt: skip
     moved = own.drift
+    path = found.track if moved is None else found.track.without(moved.velocity)
+    drawn = [_drawn("measured", path, found.begin)]
+    for label, m in zip(labels, models, strict=True):
+        if m is not None:
+            path = simulated.track_of(m.sailed, 0, profile)
+            own_drift = None
+            if moved is not None:
+                own_drift = drift.of_turn(path, 0.0, found.side)
+            path = path if own_drift is None else path.without(own_drift.velocity)
+            drawn.append(_drawn(label, path, 0.0))
     return Entry(
         voyage=found.voyage, start=found.begin, kind=found.kind, name=found.name,
         angle=found.angle, heading=found.heading, side=found.side, conditions=cond,
@@ -289,15 +295,15 @@ def _lines(
     return tuple(found)
 
 
-def _drawn(label: str, track, begin: float, zero: float) -> Drawn:
-    """From a little before the order on."""
+def _drawn(label: str, track: Track, begin: float) -> Drawn:
+    """From a little before the order on; a drift that was taken out is taken out of the path."""
     first, start = track.heading_at(begin), track.place_at(begin)
     every = max(1, len(track) // MOST_POINTS)
     gone = (track.place[::every] - start) / track.length
     c, s = math.cos(first), math.sin(first)
     path = np.stack((gone @ (c, s), gone @ (-s, c)), -1)
     return Drawn(
-        label, path, track.time[::every] - zero, np.degrees(track.heading[::every] - first),
+        label, path, track.time[::every] - begin, np.degrees(track.heading[::every] - first),
         np.degrees(track.rudder[::every]),
     )  # fmt: skip
 
@@ -356,7 +362,7 @@ def _sailed(
             manoeuvre.kind, angle, heading, profile, speed, scale, None,
             *(None if m is None else m.quantities for m in models), astern=astern,
         ),
-        drawn=tuple(_drawn(lb, simulated.track_of(m.sailed, 0, profile), 0.0, 0.0)
+        drawn=tuple(_drawn(lb, simulated.track_of(m.sailed, 0, profile), 0.0)
                     for lb, m in there),
     )  # fmt: skip
 

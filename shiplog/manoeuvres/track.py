@@ -96,6 +96,18 @@ class Track:
     def heading_at(self, time: float) -> float:
         return float(self._cubic(self.heading, self.yaw_rate, time))
 
+    def heading_before(self, time: float) -> float:
+        """At an order: from the samples before it alone, since the order bends what follows.
+
+        ψ(t) = ψₖ + ∫ r, r the parabola through the last three samples of the yaw rate
+        """
+        k = self.row(time)
+        first = max(0, k - 2)
+        late = time - float(self.time[k])
+        at = self.time[first : k + 1] - self.time[k]
+        rate = np.polynomial.Polynomial.fit(at, self.yaw_rate[first : k + 1], k - first, [-1, 1])
+        return float(self.heading[k] + rate.integ()(late))
+
     def place_at(self, time: float) -> np.ndarray:
         """[2]"""
         return self._cubic(self.place, self.velocity, time)

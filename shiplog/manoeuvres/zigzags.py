@@ -44,7 +44,7 @@ def quantities(
             break
         peaks.append(peak[0])
         if k < len(ORDINALS):
-            over = to * (peak[1] - track.heading_at(back))
+            over = to * (peak[1] - track.heading_before(back))
             found[f"{ORDINALS[k]}_overshoot"] = math.degrees(over)
         if k == 0:
             found["check_time"] = peak[0] - back

@@ -21,6 +21,7 @@ SHIP_LENGTH = 100.0  # m; a shorter one's gear is faster by Froude's law, √(10
 MOVING = 0.2  # of the fastest change: slower ones are trim, or the ends of a movement
 USUAL_RATE = 0.9  # quantile of those movements: a single faster one is a fault, or a hand
 REVOLUTIONS = 400  # between none and the most, among which the approach's are searched
+FASTEST = 1e9  # a second: of what has no known rate
 ALONG = math.cos(math.radians(45.0))  # a fixed thruster within 45 deg of the axis propels
 
 
@@ -56,10 +57,24 @@ class Controls:
         found = steering[:, None] * self.steering + ahead[:, None] * self.approach
         return np.clip(found + back[:, None] * self.astern, self.low, self.high)
 
-    def moved(self, now: np.ndarray, ordered: np.ndarray, seconds: np.ndarray) -> np.ndarray:
-        """Actuators [N, A] on their way to what was ordered, `seconds` [N] later."""
-        most = np.minimum(self.rate, 1e9)[None, :] * seconds[:, None]
-        return now + np.clip(ordered - now, -most, most)
+    def moved(
+        self, now: np.ndarray, ordered: np.ndarray, after: np.ndarray, step: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Actuators [N, A] at the end of a step, and their mean over it, of an order that is given
+        `after` [N] s into it: they stay, then move at their rate, then stay."""
+        left = (step - after)[:, None]
+        rate = np.minimum(self.rate, FASTEST)[None, :]
+        way = ordered - now
+        moving = np.minimum(np.abs(way) / rate, left)
+        end = now + np.copysign(rate * moving, way)
+        mean = now * after[:, None] + 0.5 * (now + end) * moving + end * (left - moving)
+        return end, mean / step
+
+
+def untouched(names: tuple[str, ...]) -> Controls:
+    """Of actuators whose positions are known: nothing is ordered, and nothing limits them."""
+    none, all_of = np.zeros(len(names)), np.full(len(names), math.inf)
+    return Controls(names, none, none, none, -all_of, all_of, all_of)
 
 
 def controls(

@@ -1,7 +1,7 @@
 """Helmsmen of the standard manoeuvres: what is ordered next, of many members at once.
 
-A member's order depends on its own heading or yaw rate. Between two steps the instant at which an
-order was due is interpolated, so that a step's length does not delay a reversal.
+A member's order depends on its own heading or yaw rate. When within the step that begins it will
+be due is extrapolated, so that a step's length does not delay a reversal.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ STEADY_MEAN = 2.0  # L/V over which the yaw rate is averaged for that
 class Order:
     """Of each member [N].
 
-    actuators  [N, A] ordered now
-    due        [N] s before now at which that order was due
+    actuators  [N, A] ordered in the step that begins
+    after      [N] s into it at which that order is given
     done       [N] the manoeuvre is complete
     """
 
     actuators: np.ndarray
-    due: np.ndarray
+    after: np.ndarray
     done: np.ndarray
 
 
@@ -55,10 +55,10 @@ class Helm:
         raise NotImplementedError
 
     def _ordered(
-        self, steering: np.ndarray, propulsion: float, due: np.ndarray, done: np.ndarray
+        self, steering: np.ndarray, propulsion: float, after: np.ndarray, done: np.ndarray
     ) -> Order:
         ahead = np.full(self.count, propulsion)
-        return Order(self.controls.actuators(steering, ahead), due, done)
+        return Order(self.controls.actuators(steering, ahead), after, done)
 
 
 class _OfSchedule(Helm):
@@ -101,23 +101,21 @@ class _OfZigzag(Helm):
         super().__init__(*given)
         self.of = of
         self.reversed = np.zeros(self.count, dtype=int)
-        self.before = np.zeros(self.count)
+
+    def _side(self) -> np.ndarray:
+        first = math.copysign(1.0, self.of.angle)
+        return first * np.where(self.reversed % 2 == 0, 1.0, -1.0)
 
     def order(self, time: float, step: float, state: np.ndarray) -> Order:
-        first = math.copysign(1.0, self.of.angle)
-        side = first * np.where(self.reversed % 2 == 0, 1.0, -1.0)
-        turned = state[:, 4] - self.first
-        reached = (side * turned >= self.of.heading) & (self.reversed < self.of.reversals)
-        gone = turned - self.before
+        side = self._side()
+        turned, gone = side * (state[:, 4] - self.first), side * step * state[:, 5]
+        reached = (turned + gone >= self.of.heading) & (self.reversed < self.of.reversals)
         with np.errstate(all="ignore"):
-            over = (turned - side * self.of.heading) / np.where(gone == 0.0, 1.0, gone)
-        due = np.where(reached, step * np.clip(over, 0.0, 1.0), 0.0)
+            share = (self.of.heading - turned) / np.where(gone > 0.0, gone, np.inf)
+        after = np.where(reached, step * np.clip(share, 0.0, 1.0), 0.0)
         self.reversed = self.reversed + reached
-        self.before = turned
-        side = first * np.where(self.reversed % 2 == 0, 1.0, -1.0)
-        return self._ordered(
-            side * abs(self.of.angle), 1.0, due, self.reversed >= self.of.reversals
-        )
+        done = self.reversed >= self.of.reversals
+        return self._ordered(self._side() * abs(self.of.angle), 1.0, after, done)
 
 
 class _OfTurn(Helm):

@@ -98,14 +98,17 @@ class Accelerates(Protocol):
 
 
 def of_networks(networks: list[Accelerates], member: np.ndarray, has_wind: bool) -> Rates:
-    """Of trained networks; `member` [N] says which one each member is."""
+    """Of trained networks; `member` [N] says which one each member is, the first for all others."""
 
     def rates(state: np.ndarray, actuator: np.ndarray, wind: np.ndarray) -> np.ndarray:
         velocity = state[:, list(VELOCITY_IN_STATE)]
         blowing = apparent_wind(state, wind) if has_wind else np.zeros((len(state), 0))
         found = np.empty((len(state), 3))
+        which = member if len(member) == len(state) else np.zeros(len(state), dtype=int)
         for i, network in enumerate(networks):
-            rows = member == i
+            rows = which == i
+            if not rows.any():
+                continue
             found[rows] = network.accelerations(velocity[rows], actuator[rows], blowing[rows])
         return found
 

@@ -3,7 +3,7 @@
     ν̇ = f(x, u, ω; θ) + d,   η̇ = R(ψ) ν + c,   x₀ … in the water, which moves with c over ground
 
 ν by explicit Euler at the step that the model was identified with, as its rollouts are (Eq. 9);
-place and heading by the trapezoidal rule of it, since no fit compensates what Euler's loses. The
+place and heading by the trapezoidal rule of it, since no fit makes up for what Euler's loses. The
 wind over ground and the current are even and steady. d is each member's draw of what the model is
 known to get wrong (`discrepancy`), zero for the model as it stands.
 """
@@ -103,12 +103,15 @@ class Steps:
     row       between two instants that are kept, s
     substeps  of Euler in each
     limits    [3] |u|, |v|, |r| at which a member has diverged
+    heun      two evaluations a step, ½ (f₀ + f₁) (Heun 1900): of coefficients that were not fitted
+              to Euler's steps, and do not make up for them
     """
 
     seconds: float
     row: float
     substeps: int
     limits: np.ndarray
+    heun: bool = False
 
 
 def sail(
@@ -142,11 +145,15 @@ def sail(
         for k in range(rows * steps.substeps):
             time = k * step
             if measured:
-                acts = order.actuators
+                acts = acting = order.actuators
             else:
-                acts = controls.moved(acts, order.actuators, order.due + step)
-            acting = acts if gear is None else gear.acting(acts, step)
+                acts, acting = controls.moved(acts, order.actuators, order.after, step)
+            if gear is not None:
+                acting = gear.acting(acting, step)
             rate = rates(state, acting, blowing)
+            if steps.heun:
+                ahead = _advanced(state, rate, step, current)
+                rate = 0.5 * (rate + rates(ahead, acting, blowing))
             if disturbance is not None:
                 rate = rate + disturbance(state, acting, step)
             state = _advanced(state, rate, step, current)

@@ -82,7 +82,10 @@ class Schedule:
         if self.between == HOLD:
             row = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, None)
             return {name: np.asarray(values)[row] for name, values in self.orders.items()}
-        return {name: np.interp(time, self.time, values) for name, values in self.orders.items()}
+        return {
+            name: np.asarray(np.interp(time, self.time, values))
+            for name, values in self.orders.items()
+        }
 
     def duration(self, length_time: float) -> float:
         """s; `length_time` is L/V [s]."""

@@ -6,6 +6,7 @@ has sailed says so: the resolution wants measured values where there are some.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from importlib.metadata import version
 
@@ -142,10 +143,15 @@ def _of_kind(sheet: Sheet, kind: str) -> list[Entry]:
 
 
 def _best(sheet: Sheet, kind: str) -> list[Entry]:
-    """Those that were sailed and are of the standard, else the model's."""
+    """Those that were sailed and are of the standard; for each that was not, the model's."""
     found = _of_kind(sheet, kind)
     sailed = [e for e in found if e.voyage is not None and e.standard]
-    return sailed or [e for e in found if e.voyage is None]
+
+    def like(one: Entry) -> tuple[int, int, float]:
+        return round(math.degrees(one.angle)), round(math.degrees(one.heading)), one.side
+
+    there = {like(one) for one in sailed}
+    return [*sailed, *(e for e in found if e.voyage is None and like(e) not in there)]
 
 
 def _turning(sheet: Sheet) -> list[Block]:

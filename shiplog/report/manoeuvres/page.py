@@ -9,6 +9,7 @@ from shiplog.exceptions import listed
 from shiplog.manoeuvres.criteria import SHIPS
 from shiplog.manoeuvres.quantity import Estimate
 from shiplog.manoeuvres.sheet import Entry, Sheet
+from shiplog.manoeuvres.sheet import Line as Quantity
 from shiplog.nomenclature.numbers import counted
 from shiplog.report.manoeuvres import drawing
 from shiplog.report.manoeuvres.sheet import (
@@ -35,6 +36,7 @@ from shiplog.report.page.blocks import (
     Section,
 )
 
+MODELS = ("simulated", "extended")
 MOST_DRAWN = 24  # manoeuvres with a picture; the table has them all
 TERMS = (
     ("advance, transfer, tactical diameter", "distances along and across the approach at 90 and "
@@ -100,24 +102,34 @@ def _answer(sheet: Sheet, sailed: Sequence[Entry], alone: Sequence[Entry]) -> tu
 
 
 def _summary(sheet: Sheet, sailed: Sequence[Entry], alone: Sequence[Entry]) -> list[Block]:
-    notes: list[Line] = [[note] for note in (*not_applying((*sailed, *alone)), *sheet.notes)]
+    """What IMO's standards ask about, of every manoeuvre that has it."""
+    entries = (*sailed, *alone)
+    found: Sequence[tuple[Entry, Quantity]] = [
+        (e, line) for e in entries for line in e.lines if line.limit is not None
+    ]
+    columns = [("measured", "measured")] if sailed else []
+    columns += [(k, k) for k, run in zip(MODELS, sheet.runs, strict=True) if run]
+    judged = any(line.limit.applies for _, line in found if line.limit is not None)
     rows = []
-    for entry in (*sailed, *alone):
-        for line in entry.lines:
-            if line.limit is None:
-                continue
-            kept = met(line)
-            verdict = "does not apply" if kept is None else ("kept" if kept else "exceeded")
-            best = line.measured or line.extended or line.simulated
-            rows.append((
-                [entry.voyage or "model alone"], [entry.name], [line.kind.words],
-                _cell(best, line.kind.unit), [limit(line)], [verdict],
-            ))  # fmt: skip
-    blocks: list[Block] = []
-    if rows:
-        titles = ("voyage", "manoeuvre", "quantity", "value", "IMO MSC.137(76)", "limit")
-        blocks.append(Grid(titles, rows, ("value",), "Quantities that have a limit"))
-    return [*blocks, Items(notes)]
+    for entry, line in found:
+        kept = {True: "kept", False: "exceeded", None: "-"}[met(line)]
+        rows.append((
+            [_place(entry)], [entry.name], [line.kind.words],
+            *(_cell(getattr(line, key), line.kind.unit) for _, key in columns), [limit(line)],
+            *([[kept]] if judged else []),
+        ))  # fmt: skip
+    titles = (
+        "voyage", "manoeuvre", "quantity", *(title for title, _ in columns), "IMO MSC.137(76)",
+        *(["limit"] if judged else []),
+    )  # fmt: skip
+    right = [title for title, _ in columns]
+    table: list[Block] = [Grid(titles, rows, right, "What the standards ask about")] if rows else []
+    notes: list[Line] = [[note] for note in (*not_applying(entries), *sheet.notes)]
+    return [*table, Items(notes)]
+
+
+def _place(entry: Entry) -> str:
+    return "model alone" if entry.voyage is None else f"{entry.voyage}, {entry.start:.0f} s"
 
 
 def _cell(estimate: Estimate | None, unit: str) -> Line:

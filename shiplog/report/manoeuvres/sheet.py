@@ -18,6 +18,7 @@ from shiplog.report.result import Shown, Shows
 
 MOST_PARTS = 8  # manoeuvres without any quantity that are listed by name
 NONE = "-"
+MOST_DIGITS = 2  # decimals: a hundredth of a length, or of a degree, is no more than noise
 SCHEMA = {
     "voyage": pl.String, "start_s": pl.Float64, "kind": pl.String, "manoeuvre": pl.String,
     "standard": pl.Boolean, "quantity": pl.String, "unit": pl.String,
@@ -189,21 +190,19 @@ def value(estimate: Estimate | None) -> str:
     if estimate is None:
         return NONE
     star = "*" if estimate.note else ""
-    if not estimate.high > estimate.low:
-        return f"{_number(estimate.value)}{star}"
     digits = _digits(estimate)
     low, high, middle = (f"{x:.{digits}f}" for x in (estimate.low, estimate.high, estimate.value))
+    if low == high:
+        return f"{middle}{star}"
     return f"{middle}{star} ({low} to {high})"
 
 
 def _digits(estimate: Estimate) -> int:
-    """Decimals that the interval's width deserves: two digits of it."""
-    width = max(estimate.high - estimate.low, 1e-9)
-    return int(min(3, max(0, 1 - math.floor(math.log10(width)))))
-
-
-def _number(x: float) -> str:
-    return figure(x, 3)
+    """Decimals that the interval's width deserves, two digits of it; no more than MOST_DIGITS."""
+    width = estimate.high - estimate.low
+    if width <= 0.0:
+        return MOST_DIGITS
+    return int(min(MOST_DIGITS, max(0, 1 - math.floor(math.log10(width)))))
 
 
 def limit(line: Line) -> str:

@@ -17,68 +17,56 @@ from shiplog.exceptions import ModelError, listed
 from shiplog.nomenclature.channels import STATE, VELOCITY, WIND
 from shiplog.nomenclature.frames import in_body_axes
 from shiplog.ship_profile.profile import Profile
-from shiplog.simulation import coverage, discrepancy
-from shiplog.simulation.controls import STEERING_CAUSES, Controls, Gear, controls
+from shiplog.simulation import coverage, discrepancy, prediction_interval, rollout
+from shiplog.simulation.controls import (
+    STEERING_CAUSES,
+    Controls,
+    Gear,
+    controls,
+    untouched,
+)
 from shiplog.simulation.discrepancy import Discrepancy
 from shiplog.simulation.helm import Helm, OfTables, helm
 from shiplog.simulation.members import Rates, of_networks, of_physics
+from shiplog.simulation.prediction_interval import Band
 from shiplog.simulation.sailing import DIVERGED, STILL, Sailed, Steps, Water, sail
 from shiplog.simulation.schedules import Manoeuvre, Schedule
 from shiplog.simulation.window_series import apparent_wind, true_wind
+from shiplog.training.runs.outside import Outside
+from shiplog.training.runs.sailing_inputs import STATES, refuse_unknown, starts
+from shiplog.training.runs.sailing_inputs import tables as tables_of
+from shiplog.voyages.windows import windows
+from shiplog.voyages.windows.split import plan
 
 MEMBERS = 200  # of an ensemble: the ends of a 90 % interval are known to a tenth of its width
 APPROACH = 0.9  # quantile of the training data's speed, where none is given
+LEAST_SPEED = 1e-3  # m/s, of a ship that never went ahead
 FARTHEST = 10.0  # times that the discrepancy is widened outside the training data, at most
-STATES = tuple(c.name for c in STATE)
 
 
 class Sails(Protocol):
     """What is asked of a run: `load_model.Run`, which imports this module."""
 
-    path: Any
-    config: Any
-    profile: Profile
-    extension: Any
-
+    @property
+    def path(self) -> Any: ...
+    @property
+    def config(self) -> Any: ...
+    @property
+    def profile(self) -> Profile: ...
+    @property
+    def extension(self) -> Any: ...
     @property
     def name(self) -> str: ...
     @property
+    def given(self) -> bool: ...
+    @property
     def judges_itself(self) -> bool: ...
     def training(self) -> pl.DataFrame: ...
+    def validation(self) -> pl.DataFrame: ...
+    def models(self) -> dict[int, Any]: ...
     def band(self) -> Any: ...
     def simulator(self, seed: int) -> Any: ...
     def extended(self, seed: int) -> Any: ...
-
-
-@dataclass(frozen=True)
-class Outside:
-    """Where a simulation left the run's training data.
-
-    share      of its seconds
-    distance   mean over them, in limits of the coverage; 1 where all are inside
-    channels   name → share of the seconds in which that channel is beyond what was recorded
-    """
-
-    share: float
-    distance: float
-    channels: Mapping[str, float]
-
-    @property
-    def anywhere(self) -> bool:
-        return self.share >= coverage.OUTSIDE
-
-    @property
-    def sentence(self) -> str:
-        """Empty where it is inside."""
-        if not self.anywhere:
-            return ""
-        where = [
-            f"{name.replace('_', ' ')} ({share:.0%})"
-            for name, share in sorted(self.channels.items(), key=lambda one: -one[1])
-            if share >= coverage.OUTSIDE
-        ]
-        named = f": {', '.join(where)}" if where else ""
-        return f"outside the training data in {self.share:.0%} of the seconds{named}"
 
 
 class Sailor:
@@ -105,7 +93,10 @@ class Sailor:
         self._seeds = tuple(run.config.seeds)
         self._physics = [_physics(run, seed) for seed in self._seeds]
         self.substeps = self._physics[0].substeps if self._physics[0] else 1
+        # published or estimated coefficients are those of the equations, not of Euler's steps
+        self.heun = run.given
         self._controls: dict[tuple[float, float], Controls] = {}
+        self.fitted_band = False  # whether its discrepancy is of voyages that it was fitted to
         self._roots: list[np.ndarray] | None = None
         self._discrepancy: Discrepancy | None = None
         self._coverage: coverage.Coverage | None = None
@@ -125,13 +116,14 @@ class Sailor:
 
     def _drawn(self, count: int, rng: np.random.Generator) -> np.ndarray:
         """θ [N, P] of seeds in turn, from N(θ, Σ) but for the first."""
-        found = np.empty((count, len(self._physics[0].theta)))
+        seeds = [one for one in self._physics if one is not None]
+        found = np.empty((count, len(seeds[0].theta)))
         if self._roots is None:
-            self._roots = [_root(one.covariance) for one in self._physics]
-        for i, (one, root) in enumerate(zip(self._physics, self._roots, strict=True)):
-            rows = np.arange(i, count, len(self._physics))
+            self._roots = [_root(one.covariance) for one in seeds]
+        for i, (one, root) in enumerate(zip(seeds, self._roots, strict=True)):
+            rows = np.arange(i, count, len(seeds))
             found[rows] = one.theta + rng.standard_normal((len(rows), len(one.theta))) @ root.T
-        found[:1] = self._physics[0].theta
+        found[:1] = seeds[0].theta
         return found
 
     def _networks(self) -> list[Any]:
@@ -173,7 +165,7 @@ class Sailor:
     @property
     def discrepancy(self) -> Discrepancy:
         if self._discrepancy is None:
-            band = self.run.band()
+            band = self.run.band() or self._own_band()
             slip = _slip(self.profile)
             none = Discrepancy(np.zeros(3), 1.0, 1.0, slip)
             if band is None:
@@ -189,6 +181,22 @@ class Sailor:
                     wind, self.row, self.substeps, self.length, slip,
                 )  # fmt: skip
         return self._discrepancy
+
+    def _own_band(self) -> Band | None:
+        """Of a run that has none, as one that a diagnosis extended: from its validation voyages,
+        else from those of its training."""
+        size, names = self.run.config.window, (self.profile.actuator_names, self.profile.wind_names)
+        for rows in (self.run.validation(), self.training):
+            if rows.is_empty() or (planned := plan(rows, "ref", size)).is_empty():
+                continue
+            cut = windows.cut(rows, planned, size, *names)
+            first = next(iter(self.run.models().values()))
+            with np.errstate(all="ignore"):
+                error = rollout.simulate(first, cut) - cut.state
+            groups = cut.plan["voyage"].n_unique()
+            self.fitted_band = rows is self.training and not self.run.given
+            return prediction_interval.calibrate(error, np.zeros_like(error), groups)
+        return None
 
     def outside(self, sailed: Sailed, member: int = 0) -> Outside:
         """Where a member left the training data."""
@@ -235,6 +243,11 @@ class Sailor:
             found.append(
                 f"It was extended by {listed(self.ignored)}, which is about what is recorded: "
                 "it does not change how the ship sails."
+            )
+        if self.fitted_band:
+            found.append(
+                "Its discrepancy is that of the voyages that it was fitted to: on others it is "
+                "larger, and so is the interval."
             )
         if not self.spreads:
             found.append(
@@ -291,13 +304,12 @@ class Sailor:
 
         def sailed(first: np.ndarray, rates: Rates, more: Any) -> Sailed:
             given = (sticks, first, self.length / own)
-            recorded = positions is not None
-            made = OfTables(positions[0], positions[1][None], *given) if recorded else helm(
-                manoeuvre, *given
-            )  # fmt: skip
+            made = helm(manoeuvre, *given)
+            if positions is not None:
+                made = OfTables(positions[0], positions[1][None], *given)
             return sail(
                 rates, made, sticks, first, steps, water=water, gear=self.gear(), disturbance=more,
-                measured=recorded,
+                measured=positions is not None,
             )  # fmt: skip
 
         alone = sailed(start, self.rates(1), None)
@@ -311,7 +323,7 @@ class Sailor:
         return sailed(many, self.rates(members, rng), process), left
 
     def _steps(self, seconds: float) -> Steps:
-        return Steps(seconds, self.row, self.substeps, self.limits)
+        return Steps(seconds, self.row, self.substeps, self.limits, heun=self.heun)
 
     def frame(
         self,
@@ -324,34 +336,33 @@ class Sailor:
         seconds: float | None = None,
     ) -> Sailed:
         """As many members as `start` has rows or `inputs` has members; see `Run.simulate`."""
-        first = _starts(start, self.speed)
-        tables = None
+        first = starts(start, self.speed)
+        speed = float(np.median(first[:, 1]))
+        own = speed if speed > 0.0 else max(self.speed, LEAST_SPEED)
+        recorded = isinstance(inputs, pl.DataFrame)
+        made: Helm
         if isinstance(inputs, pl.DataFrame):
-            tables = _tables(inputs, self.profile.actuator_names)
-            seconds = tables[0][-1] if seconds is None else seconds
-            if len(tables[1]) != len(first) and 1 not in (len(tables[1]), len(first)):
+            time, values = tables_of(inputs, self.profile.actuator_names)
+            if len(values) != len(first) and 1 not in (len(values), len(first)):
                 raise ModelError(
-                    f"`inputs` has {len(tables[1])} members and `start` {len(first)} rows.",
+                    f"`inputs` has {len(values)} members and `start` {len(first)} rows.",
                     hint="give one of them, or as many of both.",
                 )
-            first = np.repeat(first, len(tables[1]), axis=0) if len(first) == 1 else first
+            first = np.repeat(first, len(values), axis=0) if len(first) == 1 else first
+            length = float(time[-1])
+            sticks = untouched(self.profile.actuator_names)
+            made = OfTables(time, values, sticks, first, self.length / own)
         else:
             refuse_unknown(inputs, self.profile.actuator_names)
-        speed = float(np.median(first[:, 1]))
-        own = speed if speed > 0.0 else max(self.speed, 1e-3)
-        sticks = self.controls(own)
-        length_time = self.length / own
-        made: Helm
-        if tables is not None:
-            made = OfTables(*tables, sticks, first, length_time)
-        else:
-            made = helm(inputs, sticks, first, length_time)
-            seconds = inputs.duration(length_time) if seconds is None else seconds
+            sticks = self.controls(own)
+            length = inputs.duration(self.length / own)
+            made = helm(inputs, sticks, first, self.length / own)
         rng = np.random.default_rng(seed) if spread else None
         process = None if rng is None else self.discrepancy.process(len(first), rng)
+        steps = self._steps(length if seconds is None else seconds)
         return sail(
-            self.rates(len(first), rng), made, sticks, first, self._steps(float(seconds)),
-            water=water, gear=self.gear(), disturbance=process, measured=tables is not None,
+            self.rates(len(first), rng), made, sticks, first, steps, water=water,
+            gear=self.gear(), disturbance=process, measured=recorded,
         )  # fmt: skip
 
 
@@ -367,16 +378,6 @@ def _slip(profile: Profile) -> np.ndarray:
         a.diameter_m or 0.0 if a.kind == "propeller" else 0.0 for a in profile.actuators
     ])  # fmt: skip
     return found / max(int((found > 0.0).sum()), 1)
-
-
-def refuse_unknown(manoeuvre: Manoeuvre, names: tuple[str, ...]) -> None:
-    """Raises ModelError for a schedule of actuators that the ship has not."""
-    other = set(manoeuvre.orders) - set(names) if isinstance(manoeuvre, Schedule) else ()
-    if other:
-        raise ModelError(
-            f"The schedule {manoeuvre.name} orders {listed(other)}, which the ship has not.",
-            hint=f"its actuators are {listed(names)}.",
-        )
 
 
 @dataclass(frozen=True)
@@ -410,53 +411,6 @@ def _over_ground(start: np.ndarray, water: Water) -> np.ndarray:
     return found
 
 
-def _starts(start: pl.DataFrame | Mapping[str, float] | None, speed: float) -> np.ndarray:
-    """States [N, 6] over ground; what is left out is zero, and the surge the run's usual one."""
-    rows = pl.DataFrame({} if start is None else start) if not isinstance(start, pl.DataFrame) \
-        else start  # fmt: skip
-    other = set(rows.columns) - set(STATES) - {"member"}
-    if other:
-        raise ModelError(
-            f"`start` has {listed(other)}, which is no part of a ship's state.",
-            hint=f"its columns are {listed(STATES)}, SI.",
-        )
-    count = max(rows.height, 1)
-    found = np.zeros((count, 6))
-    found[:, 1] = speed
-    for i, name in enumerate(STATES):
-        if name in rows.columns:
-            found[:, i] = rows[name].cast(pl.Float64).to_numpy()
-    if not np.isfinite(found).all():
-        raise ModelError("`start` has a state that is not finite.", hint="give numbers, SI.")
-    return found
-
-
-def _tables(inputs: pl.DataFrame, names: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Times [K] and actuators [N, K, A] of rows (member), time, actuators."""
-    lacking = [n for n in ("time", *names) if n not in inputs.columns]
-    if lacking:
-        raise ModelError(
-            f"`inputs` lacks {listed(lacking)}.",
-            hint=f"its columns are time [s] and {listed(names)}, SI; `member` where they differ.",
-        )
-    count = inputs["member"].n_unique() if "member" in inputs.columns else 1
-    ordered = inputs.sort("member", "time") if count > 1 else inputs.sort("time")
-    values = ordered.select("time", *names).cast(pl.Float64).to_numpy()
-    if not len(values) or len(values) % count or not np.isfinite(values).all():
-        raise ModelError(
-            "`inputs` has no rows, members of other lengths, or values that are not finite.",
-            hint="give every member the same times, and every row numbers, SI.",
-        )
-    values = values.reshape(count, -1, 1 + len(names))
-    time = values[0, :, 0]
-    if (values[..., 0] != time).any() or (np.diff(time) <= 0.0).any() or time[0] < 0.0:
-        raise ModelError(
-            "The times of `inputs` do not rise, or differ from member to member.",
-            hint="give every member the same times, in seconds from zero on.",
-        )
-    return time, values[..., 1:]
-
-
 def of_run(run: Sails) -> Sailor:
     """Raises RunError or ModelError where the run cannot be sailed."""
     return Sailor(run)
@@ -477,5 +431,5 @@ def without_water(sailor: Sailor) -> Sailor:
         else held.covariance[c.label]
         for c in held.causes
     }  # fmt: skip
-    return Sailor(replace(sailor.run, extension=replace(held, numbers=numbers,
-                                                       covariance=covariance)))  # fmt: skip
+    calm = replace(held, numbers=numbers, covariance=covariance)
+    return Sailor(replace(sailor.run, extension=calm))  # type: ignore[type-var]  # a dataclass

@@ -86,12 +86,12 @@ def _of_theta(model: Simulator | ExtendedSimulator, theta: np.ndarray, cut: Wind
 def _as_sailed(states: np.ndarray, cut: Windows, sailor: Sailor) -> Sailed:
     count = len(states)
     bad = ~(np.abs(states[..., [1, 3, 5]]) < sailor.limits).all(-1)
-    first = np.where(bad.any(1), bad.argmax(1), states.shape[1])
+    first = np.where(np.any(bad, axis=1), bad.argmax(1), states.shape[1])
     since = cut.since[0]
-    diverged = np.where(bad.any(1), since[np.minimum(first, len(since) - 1)], np.inf)
+    diverged = np.where(np.any(bad, axis=1), since[np.minimum(first, len(since) - 1)], np.inf)
     kept = np.where((np.arange(states.shape[1]) < first[:, None])[..., None], states, np.nan)
     actuator = np.repeat(cut.actuator, count, axis=0)
-    ended = np.where(bad.any(1), np.inf, since[-1])
+    ended = np.where(np.any(bad, axis=1), np.inf, since[-1])
     return Sailed(since, kept, actuator, ended, diverged, STILL, sailor.profile.actuator_names)
 
 
