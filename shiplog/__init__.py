@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         ingest,
         load,
         open_store,
+        plan,
         profile,
         sensors,
         simulate,
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from shiplog.report.evaluation.evaluation import Evaluation
     from shiplog.report.fleet.fleet import Fleet
     from shiplog.report.manoeuvres.sheet import ManoeuvreSheet
+    from shiplog.report.planning import Planned
     from shiplog.report.simulation import Simulation
     from shiplog.training.runs.load_model import Run
     from shiplog.voyages.store.store import Store
@@ -60,6 +62,7 @@ __all__ = [
     "Gate",
     "Ingested",
     "ManoeuvreSheet",
+    "Planned",
     "Run",
     "SensorComparison",
     "ShiplogError",
@@ -78,6 +81,7 @@ __all__ = [
     "ingest",
     "load",
     "open_store",
+    "plan",
     "profile",
     "sensors",
     "simulate",
@@ -95,6 +99,7 @@ _CLASSES = {
     "Gate": "commands.gate",
     "Ingested": "commands.prepare",
     "ManoeuvreSheet": "report.manoeuvres.sheet",
+    "Planned": "report.planning",
     "Run": "training.runs.load_model",
     "SensorComparison": "commands.sensors",
     "ShiplogError": "exceptions",

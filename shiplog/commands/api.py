@@ -8,6 +8,7 @@ function that needs it: a store opens in a tenth of a second.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from shiplog.report.evaluation.evaluation import Evaluation
     from shiplog.report.fleet.fleet import Fleet
     from shiplog.report.manoeuvres.sheet import ManoeuvreSheet
+    from shiplog.report.planning import Planned
     from shiplog.report.simulation import Simulation
     from shiplog.simulation.schedules import Manoeuvre
     from shiplog.training.runs.load_model import Run
@@ -366,6 +368,42 @@ def simulate(
     return simulating.simulate_run(
         opened, manoeuvre, speed=speed, water=water, members=members, seed=seed, seconds=seconds,
         out=to,
+    )  # fmt: skip
+
+
+def plan(
+    run: AnyRun,
+    store: AnyStore,
+    out: str | Path | None = None,
+    *,
+    seconds: float | None = None,
+    rudder_deg: float | None = None,
+    speed: tuple[float, float] | None = None,
+    room: tuple[float, float] | None = None,
+    wind: tuple[float, float] | None = None,
+    causes_only: bool = False,
+    seed: int = 0,
+) -> Planned:
+    """What to sail next: the manoeuvre that says most about a run's coefficients within the
+    limits, how narrow their intervals will be, and which causes it tells apart. Written to `out`,
+    or to the run's folder `plan`.
+
+    rudder_deg   hardest rudder
+    speed        m/s between which the ship keeps
+    room         m of water ahead and aside
+    wind         that is expected: m/s, and deg clockwise from x₀ that it comes from
+
+    Raises ShiplogError.
+    """
+    from shiplog.commands import plan as planning
+    from shiplog.simulation.sailing import Water, from_direction
+
+    (path,) = _runs(run)
+    return planning.plan_run(
+        path, Store(_path(store)), None if out is None else Path(out), seconds=seconds,
+        rudder=None if rudder_deg is None else math.radians(rudder_deg), speed=speed, room=room,
+        water=None if wind is None else Water(wind=from_direction(*wind)), seed=seed,
+        causes_only=causes_only,
     )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ import pytest
 from commands import call
 from short_voyages import BOTH, train
 
+import shiplog
 from shiplog.planning import limits, plan, search
 from shiplog.planning.limits import NoRoom
 from shiplog.planning.plan import CannotPlan
@@ -95,6 +96,11 @@ def test_the_bridge_gets_a_sheet_of_whole_orders(planned):
 def test_limits_that_leave_no_room_are_said(given, tmp_path, options, said):
     code, _, text = call("plan", given, "--store", tmp_path, "--out", tmp_path / "plan", *options)
     assert code == 1 and said in text and not (tmp_path / "plan").exists()
+
+
+def test_python_gets_the_same_refusals(given, tmp_path):
+    with pytest.raises(shiplog.ShiplogError, match="less than the ship's length"):
+        shiplog.plan(given, tmp_path, tmp_path / "plan", room=(2.0, 50.0), rudder_deg=20.0)
 
 
 def test_water_in_which_nothing_can_be_sailed_is_said(given, monkeypatch):
