@@ -218,6 +218,18 @@ def test_messages_of_two_links_count_once(tmp_path):
 
 
 @needed
+def test_another_component_of_the_vehicle_has_its_own_clock(tmp_path):
+    """A camera sends more SYSTEM_TIME than the autopilot, by another boot."""
+    station = circle()
+    for k in range(200):
+        boot = 7_000_000 + 1000 * k
+        station.take("SYSTEM_TIME", round((START + k) * 1e6), boot, at=START + k / 4,
+                     sender=(1, 100))  # fmt: skip
+    found, _ = read(station, tmp_path)
+    assert abs(found["/gyro"].time[0] - Voyage().ns[0]) <= 1000
+
+
+@needed
 def test_another_vehicle_stays_apart(tmp_path):
     station = circle()
     for i in range(30):

@@ -291,6 +291,17 @@ def test_sources_stay_apart(tmp_path):
     ]  # fmt: skip
 
 
+def test_an_order_stands_for_a_rudder_only_where_no_position_is_sent(tmp_path):
+    def messages():
+        for k in range(40):
+            yield START + k, 127245, 7, n2k.rudder(0, None, order=0.01 * k)
+
+    found, _ = topics(tmp_path, messages())
+    rudder = found["/rudder/main"]
+    assert rudder.columns["angle_deg"][10] == pytest.approx(math.degrees(0.1), abs=1e-6)
+    assert "CHECK: a set-point" in rudder.metadata["doubt"]
+
+
 def test_the_rate_of_turn_is_that_of_the_bow_to_starboard(tmp_path):
     found, _ = topics(tmp_path, n2k.circle())
     rate = found["/gyro/rate"].columns["yaw_rate_degps"]

@@ -118,8 +118,11 @@ class _Fixes:
     """A receiver's records: when by both clocks, and whether they are valid."""
 
     def __init__(self, number: int, table: Table, accuracy: Table | None) -> None:
-        once = np.concatenate(([True], np.diff(table.number("GMS")) != 0))
-        once |= table.number("Status") < FIX_3D
+        again = np.zeros(len(table), bool)  # a fix that was written twice
+        again[1:] = table.number("Status")[1:] >= FIX_3D
+        for label in ("GMS", "Lat", "Lng", "Spd"):
+            again[1:] &= np.diff(table.number(label)) == 0
+        once = ~again
         self.number, self.table, self.accuracy = number, table.take(np.flatnonzero(once)), accuracy
         table = self.table
         self.valid = table.number("Status") >= FIX_3D

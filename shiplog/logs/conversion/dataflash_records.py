@@ -30,7 +30,7 @@ FORMATS = {  # letter: numpy type, divisor of the whole number
 }  # fmt: skip
 DESCRIBING = ("FMTU", "UNIT", "MULT")
 INSTANCE = "#"  # the unit of a field that tells instruments of a kind apart
-INSTANCE_LABELS = ("I", "C", "Inst", "Instance")  # of logs without units
+INSTANCE_LABELS = ("I", "C", "Inst", "Instance")  # where no unit marks one
 
 
 @dataclass(frozen=True, slots=True)
@@ -318,6 +318,6 @@ class _Units:
             unit[label] = self.names.get(units[i : i + 1], "")
             if units[i : i + 1] == INSTANCE:
                 instance = label
-        if not units:
+        if not instance:
             instance = next((one for one in INSTANCE_LABELS if one in layout.labels), "")
         return Table(rows, divisor, unit, instance)

@@ -132,13 +132,19 @@ def _systems(found: Telemetry) -> list[int]:
 
 
 def _vehicle(found: Telemetry, system: int) -> _Vehicle:
-    """The messages of its autopilot: of each kind those of the component that sends most."""
+    """The messages of its autopilot, the component that sends most of the motion; of a kind that
+    this one does not send those of the component that sends most."""
     own: dict[str, Messages] = {}
+    moving = np.concatenate([
+        found.messages[name].sender for name in MOTION if name in found.messages
+    ])  # fmt: skip
+    known, often = np.unique(moving[moving // 256 == system], return_counts=True)
+    autopilot = known[np.argmax(often)]
     for name, messages in found.messages.items():
         mine = messages.take(np.flatnonzero(messages.sender // 256 == system))
         if len(mine):
             components, counts = np.unique(mine.sender, return_counts=True)
-            chosen = components[np.argmax(counts)]
+            chosen = autopilot if autopilot in components else components[np.argmax(counts)]
             own[name] = mine.take(np.flatnonzero(mine.sender == chosen))
     received, boot = _since_boot(own)
     starts = received[1:][np.diff(boot) < -RESTART_MS]

@@ -272,19 +272,26 @@ def _by_instance(parts: list[Part], valid: Callable[[Part], np.ndarray]) -> Iter
 
 
 def _rudders(of: _Bus) -> list[Series]:
-    """The rudders by instance: positions; what another sender repeats of one is no rudder more."""
+    """The rudders by instance: positions; what another sender repeats of one is no rudder more.
+    Without any position the order, which the draft asks about."""
+    name = "angle"
     instances = list(_by_instance(of.each(127245), lambda part: part.of("angle")))
+    if not instances:
+        name = "order"
+        instances = list(_by_instance(of.each(127245), lambda part: part.of("order")))
     series: list[Series] = []
     kept: list[Part] = []
     for instance, parts in instances:
         for part in parts:
-            name = "/rudder/main" if len(instances) == 1 else f"/rudder/rudder_{instance}"
-            columns = {"angle_deg": part.of("angle") * DEG}
+            base = "/rudder/main" if len(instances) == 1 else f"/rudder/rudder_{instance}"
+            columns = {"angle_deg": part.of(name) * DEG}
             said = _said(part, instance=str(instance))
             if not any(_repeats(part, other) for other in kept):
                 kept.append(part)
                 said |= {"actuator": "rudder", "unit": "deg", "why": "PGN 127245"}
-            topic = _named(name, part.source, len(parts))
+            if name == "order":
+                said["doubt"] = "CHECK: a set-point; 127245 has the order, and no position"
+            topic = _named(base, part.source, len(parts))
             series.append(
                 Series(topic, "shiplog.Rudder", part.time, columns, frame_id="nmea2000",
                        metadata=said)
