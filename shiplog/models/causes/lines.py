@@ -188,8 +188,8 @@ class Line(Cause):
         if "x0" not in estimates:
             towards = round(estimates["direction"].value) % 360
             return (
-                f"A line pulls with {pull} towards {towards} deg, {fast}; its point is "
-                "too far away, or too uncertain, to have a place."
+                f"A line, or a tow that does not turn, pulls with {pull} towards {towards} deg, "
+                f"{fast}; its point is too far away, or too uncertain, to have a place."
             )
         north, east = (
             f"{estimates[k].value:.1f} ({estimates[k].low:.1f} to {estimates[k].high:.1f}) m"
@@ -221,7 +221,8 @@ class Tow(Cause):
 
         F(τ) = ½ (1 + cos πτ - sin πτ) F₀ + sin πτ F½ + ½ (1 - cos πτ - sin πτ) F₁,   N = l Y
 
-    A force of constant size that turns by up to 180 deg, evenly, is one of these.
+    A force of constant size that turns by up to 180 deg, evenly, is one of these; one that neither
+    turns nor grows is a line whose point is far away, with fewer numbers.
 
     Size: `PULL` each way. Where it is made fast: anywhere on the length, 0.29 of it in the root
     mean square.
