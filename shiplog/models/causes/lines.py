@@ -24,6 +24,10 @@ LEAST_PULL = 3e-4  # N/kg, of which a ship under way drifts no farther than in a
 # Share of such a force that its equations leave wrong: no rope is a spring all the way.
 ROPE = 0.1
 
+# Share of a force or of its lever: motion tells both by the inertia with added masses, which
+# formulas know to a tenth (as of a load, `ship.Payload`).
+INERTIA = 0.1
+
 # Lengths of the ship. Where it went no farther from its middle than this, a line's force is the
 # same everywhere.
 LEAST_REACH = 0.5
@@ -105,6 +109,7 @@ class Line(Cause):
         "shallow_water": "a drifting stop: a line moves the ship, shallow water does not",
     }
     form_error = ROPE
+    unit_error = INERTIA
 
     @property
     def nominal(self) -> bool:
@@ -249,6 +254,7 @@ class Tow(Cause):
         "wind_force": "repeat in calm, or turn: wind force follows the wind",
     }
     form_error = ROPE
+    unit_error = INERTIA
 
     @property
     def nominal(self) -> bool:
@@ -353,6 +359,7 @@ class Contact(Cause):
         "line": "the same run farther from the wall",
     }
     form_error = COARSE
+    unit_error = INERTIA
 
     @property
     def nominal(self) -> bool:
