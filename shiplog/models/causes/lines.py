@@ -324,11 +324,13 @@ class Contact(Cause):
     """A wall of the profile pushes the ship off while it is alongside, by fenders at its shoulders.
 
     At either shoulder, l = ±`SHOULDER` · L, with the gap d between wall and side and the unit
-    vector e away from the wall, and with the velocity w along the wall:
+    vector e away from the wall, to where the ship mostly was, and with the velocity w along it:
 
         F = ½ R e^(-d/δ),   f = -μ F w/√(w² + w₀²) along the wall,   N = l Y
 
-    with numbers R, μ and log δ/δ₀.
+    with numbers R, μ and log δ/δ₀. Off the end of a wall the gap is as much longer. A hull that is
+    beyond the wall's line, which a chart may have some metres wrong, touches; one that is farther
+    beyond than half its length is on the other side of a pier, and free.
 
     Size: R is what all its tugs together press a ship onto its fenders with, 0.01 N/kg (`PULL`
     has the source). Fenders faced with polyethylene have a friction of 0.2 or less, bare rubber of
@@ -377,25 +379,35 @@ class Contact(Cause):
         return "the ship was alongside no wall of the profile" if far else None
 
     def constants(self, setting: Setting) -> dict[str, np.ndarray]:
-        slow = SLIDING * setting.scale["speed"]
-        return Bank().constants(setting) | {"contact.slow": np.array([slow])}
+        needed = Bank().constants(setting)
+        lines, slow = needed["bank.lines"], SLIDING * setting.scale["speed"]
+        along = lines[:, 2:] - lines[:, :2]
+        size = np.sqrt((along**2).sum(1, keepdims=True))
+        off = along[:, ::-1] * [-1.0, 1.0] / size
+        middle, _ = _middle(setting)
+        side = ((np.array(middle) - lines[:, :2]) * off).sum(1, keepdims=True)
+        off = np.where(side < 0.0, -off, off)
+        return needed | {"contact.off": off, "contact.slow": np.array([slow])}
 
     def force(self, p: Any, state: Any, at: dict) -> Any:
         length, breadth = at["bank.ship"][0], at["bank.ship"][1]
-        slow = at["contact.slow"][0]
+        slow, off = at["contact.slow"][0], at["contact.off"]
         to, distance = nearest_points(state, at["bank.lines"])
-        near = nearest_share(distance, at["bank.same"])
+        away = -(to * off).sum(-1)
+        beside = jnp.abs(to[..., 0] * off[:, 1] - to[..., 1] * off[:, 0])  # off the wall's end
+        touches = jnp.where(away > -0.5 * length, 1.0, 0.0)
+        near = nearest_share(distance, at["bank.same"]) * touches
         c, s = jnp.cos(state[..., 4])[..., None], jnp.sin(state[..., 4])[..., None]
-        ahead = -(c * to[..., 0] + s * to[..., 1]) / distance  # of e, away from the wall
-        starboard = -(c * to[..., 1] - s * to[..., 0]) / distance
+        ahead = c * off[:, 0] + s * off[:, 1]  # of e
+        starboard = c * off[:, 1] - s * off[:, 0]
         # to starboard of e along the wall
         along = state[..., 3, None] * ahead - state[..., 1, None] * starboard
         grip = -p[1] * along / jnp.sqrt(along * along + slow * slow)
         x, y, n = 0.0, 0.0, 0.0
         for side in (-SHOULDER, SHOULDER):
             lever = side * length
-            gap = distance + lever * ahead - 0.5 * breadth * jnp.abs(starboard)
-            gap = jnp.maximum(gap, 0.0)
+            gap = away + lever * ahead - 0.5 * breadth * jnp.abs(starboard)
+            gap = jnp.maximum(gap, 0.0) + beside
             normal = 0.5 * p[0] * near * jnp.exp(-gap / (REACH * length * jnp.exp(p[2])))
             across = normal * (starboard + grip * ahead)
             x = x + (normal * (ahead - grip * starboard)).sum(-1)
