@@ -192,6 +192,16 @@ def test_a_wall_pushes_no_harder_than_where_it_touches_and_hardly_from_afar():
     assert abs(added("contact", numbers, (0.0, WALL - 10.0))[1]) < 1e-9
 
 
+def test_beyond_the_wall_s_line_it_touches_and_on_the_other_side_it_is_free():
+    """A chart's line is metres wrong; off its end the gap is as much longer."""
+    numbers = [2.0, 0.0, 0.0]
+    assert added("contact", numbers, (0.0, WALL + 0.4))[1] == pytest.approx(-2.0, rel=1e-3)
+    assert added("contact", numbers, (0.0, WALL + 1.6)) == pytest.approx([0.0] * 3, abs=1e-9)
+    ends = [x for x, _ in TWIN.site.banks[0]]
+    found = added("contact", numbers, (max(ends) + 0.3, WALL - 0.5 * BREADTH))
+    assert found[1] == pytest.approx(-2.0 * math.exp(-0.3 / (0.1 * LENGTH)), rel=1e-2)
+
+
 def test_a_ship_that_came_near_no_wall_touched_none():
     """A ship of three metres, 4 m and 2 m from the wall."""
     track = np.zeros((3, 6))

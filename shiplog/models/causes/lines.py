@@ -24,6 +24,10 @@ LEAST_PULL = 3e-4  # N/kg, of which a ship under way drifts no farther than in a
 # Share of such a force that its equations leave wrong: no rope is a spring all the way.
 ROPE = 0.1
 
+# Share of a force or of its lever: motion tells both by the inertia with added masses, which
+# formulas know to a tenth (as of a load, `ship.Payload`).
+INERTIA = 0.1
+
 # Lengths of the ship. Where it went no farther from its middle than this, a line's force is the
 # same everywhere.
 LEAST_REACH = 0.5
@@ -105,6 +109,7 @@ class Line(Cause):
         "shallow_water": "a drifting stop: a line moves the ship, shallow water does not",
     }
     form_error = ROPE
+    unit_error = INERTIA
 
     @property
     def nominal(self) -> bool:
@@ -188,8 +193,8 @@ class Line(Cause):
         if "x0" not in estimates:
             towards = round(estimates["direction"].value) % 360
             return (
-                f"A line pulls with {pull} towards {towards} deg, {fast}; its point is "
-                "too far away, or too uncertain, to have a place."
+                f"A line, or a tow that does not turn, pulls with {pull} towards {towards} deg, "
+                f"{fast}; its point is too far away, or too uncertain, to have a place."
             )
         north, east = (
             f"{estimates[k].value:.1f} ({estimates[k].low:.1f} to {estimates[k].high:.1f}) m"
@@ -221,7 +226,8 @@ class Tow(Cause):
 
         F(τ) = ½ (1 + cos πτ - sin πτ) F₀ + sin πτ F½ + ½ (1 - cos πτ - sin πτ) F₁,   N = l Y
 
-    A force of constant size that turns by up to 180 deg, evenly, is one of these.
+    A force of constant size that turns by up to 180 deg, evenly, is one of these; one that neither
+    turns nor grows is a line whose point is far away, with fewer numbers.
 
     Size: `PULL` each way. Where it is made fast: anywhere on the length, 0.29 of it in the root
     mean square.
@@ -248,6 +254,7 @@ class Tow(Cause):
         "wind_force": "repeat in calm, or turn: wind force follows the wind",
     }
     form_error = ROPE
+    unit_error = INERTIA
 
     @property
     def nominal(self) -> bool:
@@ -317,11 +324,13 @@ class Contact(Cause):
     """A wall of the profile pushes the ship off while it is alongside, by fenders at its shoulders.
 
     At either shoulder, l = ±`SHOULDER` · L, with the gap d between wall and side and the unit
-    vector e away from the wall, and with the velocity w along the wall:
+    vector e away from the wall, to where the ship mostly was, and with the velocity w along it:
 
         F = ½ R e^(-d/δ),   f = -μ F w/√(w² + w₀²) along the wall,   N = l Y
 
-    with numbers R, μ and log δ/δ₀.
+    with numbers R, μ and log δ/δ₀. Off the end of a wall the gap is as much longer. A hull that is
+    beyond the wall's line, which a chart may have some metres wrong, touches; one that is farther
+    beyond than half its length is on the other side of a pier, and free.
 
     Size: R is what all its tugs together press a ship onto its fenders with, 0.01 N/kg (`PULL`
     has the source). Fenders faced with polyethylene have a friction of 0.2 or less, bare rubber of
@@ -352,6 +361,7 @@ class Contact(Cause):
         "line": "the same run farther from the wall",
     }
     form_error = COARSE
+    unit_error = INERTIA
 
     @property
     def nominal(self) -> bool:
@@ -369,25 +379,35 @@ class Contact(Cause):
         return "the ship was alongside no wall of the profile" if far else None
 
     def constants(self, setting: Setting) -> dict[str, np.ndarray]:
-        slow = SLIDING * setting.scale["speed"]
-        return Bank().constants(setting) | {"contact.slow": np.array([slow])}
+        needed = Bank().constants(setting)
+        lines, slow = needed["bank.lines"], SLIDING * setting.scale["speed"]
+        along = lines[:, 2:] - lines[:, :2]
+        size = np.sqrt((along**2).sum(1, keepdims=True))
+        off = along[:, ::-1] * [-1.0, 1.0] / size
+        middle, _ = _middle(setting)
+        side = ((np.array(middle) - lines[:, :2]) * off).sum(1, keepdims=True)
+        off = np.where(side < 0.0, -off, off)
+        return needed | {"contact.off": off, "contact.slow": np.array([slow])}
 
     def force(self, p: Any, state: Any, at: dict) -> Any:
         length, breadth = at["bank.ship"][0], at["bank.ship"][1]
-        slow = at["contact.slow"][0]
+        slow, off = at["contact.slow"][0], at["contact.off"]
         to, distance = nearest_points(state, at["bank.lines"])
-        near = nearest_share(distance, at["bank.same"])
+        away = -(to * off).sum(-1)
+        beside = jnp.abs(to[..., 0] * off[:, 1] - to[..., 1] * off[:, 0])  # off the wall's end
+        touches = jnp.where(away > -0.5 * length, 1.0, 0.0)
+        near = nearest_share(distance, at["bank.same"]) * touches
         c, s = jnp.cos(state[..., 4])[..., None], jnp.sin(state[..., 4])[..., None]
-        ahead = -(c * to[..., 0] + s * to[..., 1]) / distance  # of e, away from the wall
-        starboard = -(c * to[..., 1] - s * to[..., 0]) / distance
+        ahead = c * off[:, 0] + s * off[:, 1]  # of e
+        starboard = c * off[:, 1] - s * off[:, 0]
         # to starboard of e along the wall
         along = state[..., 3, None] * ahead - state[..., 1, None] * starboard
         grip = -p[1] * along / jnp.sqrt(along * along + slow * slow)
         x, y, n = 0.0, 0.0, 0.0
         for side in (-SHOULDER, SHOULDER):
             lever = side * length
-            gap = distance + lever * ahead - 0.5 * breadth * jnp.abs(starboard)
-            gap = jnp.maximum(gap, 0.0)
+            gap = away + lever * ahead - 0.5 * breadth * jnp.abs(starboard)
+            gap = jnp.maximum(gap, 0.0) + beside
             normal = 0.5 * p[0] * near * jnp.exp(-gap / (REACH * length * jnp.exp(p[2])))
             across = normal * (starboard + grip * ahead)
             x = x + (normal * (ahead - grip * starboard)).sum(-1)
