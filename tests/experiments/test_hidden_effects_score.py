@@ -66,9 +66,9 @@ def test_what_has_a_name_since_may_be_named_or_its_remainder_found():
     limited = hidden(rudder_limit=(1.0, {"angle": (60.0, "deg")}), family="controls")
     by_name = answer(limited, named("actuator_limit"))
     assert by_name.right and by_name.found and not by_name.misnamed
-    assert by_name.statements == ((0.9, True),)
+    assert by_name.statements == ((0.95, True),)
     wrong = answer(limited, named("payload"))
-    assert wrong.misnamed and not wrong.found and wrong.statements == ((0.9, False),)
+    assert wrong.misnamed and not wrong.found and wrong.statements == ((0.95, False),)
     assert answer(TETHER, named("line")).right and answer(TETHER, UNKNOWN).right
     more = answer(TETHER, named("line", "current"))
     assert more.misnamed and not more.right
