@@ -20,7 +20,7 @@ from pipelines.experiments.hidden_effects import (
 from pipelines.experiments.hidden_effects.__main__ import main
 from pipelines.experiments.hidden_effects.plan import Plan, Planned
 from pipelines.experiments.hidden_effects.score import Sealed, open_key
-from pipelines.experiments.simulated_ship.cases import CATALOGUE, OUTSIDE, draw
+from pipelines.experiments.simulated_ship.cases import CATALOGUE, DEVICES, OUTSIDE, draw
 
 ROOT = Path(__file__).parents[2]
 
@@ -77,6 +77,19 @@ def test_every_cause_is_met_equally_often_and_rows_share_their_ships():
     assert all(len({cause.name for cause in pair}) == 2 for pair in pairs)
     assert len({p.cause for p in rows[5]}) > 30
     assert suites.plan("goals", 20000, 21).cases == goals.cases[: 21 * 6]
+
+
+def test_a_third_of_the_block_with_devices_is_actuators_lines_and_tows():
+    planned = suites.plan("devices").cases
+    assert len(planned) == 120
+    rows = {row: [p.cause for p in planned if p.label.endswith(f"-{row}")] for row in range(1, 7)}
+    assert {*rows[2], *rows[3]} == set(DEVICES) and len(rows[2] + rows[3]) == 40
+    assert not any(a == b for a, b in zip(rows[2], rows[3], strict=True))
+    assert set(rows[5]) == {"propeller_side_force", "turbulence"}
+    assert all({c.partition("+")[0] in CATALOGUE, c.partition("+")[2] in DEVICES} == {True}
+               for c in rows[6])  # fmt: skip
+    for p in planned:
+        draw(p.seed, cause=p.cause, size=p.size)
 
 
 def test_the_fixed_suite_hides_something_of_every_kind():

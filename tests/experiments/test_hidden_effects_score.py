@@ -61,6 +61,70 @@ def test_all_of_it_and_nothing_else_is_right(key, verdict, right, misnamed):
     assert (one.right, one.misnamed) == (right, misnamed)
 
 
+def test_what_has_a_name_since_may_be_named_or_its_remainder_found():
+    """Older blocks hid a rudder's limit and a line as outside the catalogue."""
+    limited = hidden(rudder_limit=(1.0, {"angle": (60.0, "deg")}), family="controls")
+    by_name = answer(limited, named("actuator_limit"))
+    assert by_name.right and by_name.found and not by_name.misnamed
+    assert by_name.statements == ((0.95, True),)
+    wrong = answer(limited, named("payload"))
+    assert wrong.misnamed and not wrong.found and wrong.statements == ((0.95, False),)
+    assert answer(TETHER, named("line")).right and answer(TETHER, UNKNOWN).right
+    more = answer(TETHER, named("line", "current"))
+    assert more.misnamed and not more.right
+    turbulent = answer(hidden(turbulence=(1.0, {}), family="stochastic"), named("line"))
+    assert turbulent.misnamed and not turbulent.right
+
+
+def test_a_faulty_unit_is_named_at_its_place():
+    def parameters(**units):
+        return {name: {"value": unit, "unit": ""} for name, unit in units.items()}
+
+    def case(name, truth, reported):
+        key, verdict = hidden(**{name: (1.0, {})}), named(name)
+        key["causes"][0]["parameters"] = parameters(**truth)
+        verdict["causes"][0]["parameters"] = parameters(**reported)
+        return answer(key, verdict)
+
+    assert case("actuator_limit", {"actuator": "port"}, {"actuator": "port"}).right
+    assert case("actuator_limit", {"actuator": "port"}, {}).right  # it does not say which
+    assert case("actuator_limit", {"actuator": "port"}, {"actuator": "starboard"}).misnamed
+    two = {"actuator": "port", "other": "starboard"}
+    assert case("actuators_exchanged", two, {"actuator": "starboard", "other": "port"}).right
+
+
+def test_actuators_and_lines_have_rows_of_their_own():
+    answers = [
+        answer(hidden(actuator_rate=(1.0, {})), named("actuator_rate")),
+        answer(hidden(actuator_rate=(1.0, {})), named("rudder_lag"), seed=2),
+        answer(hidden(line=(1.0, {})), named("line"), seed=3),
+        answer(CURRENT, named("current"), seed=4),
+    ]
+    rows = measured(answers)
+    assert rows["actuators, size 1: named right"][1] == "1/2"
+    assert rows["lines, tows and contact, size 1: named right"][1] == "1/1"
+    assert rows["one cause, size 1, 7000 s: named right"][1] == "1/1"
+
+
+def test_the_numbers_of_lines_tows_and_units_are_compared():
+    line = {
+        "stiffness": (2.0, "N/m"),
+        "north": (30.0, "m"),
+        "east": (40.0, "m"),
+        "length": (50.0, "m"),
+    }
+    truth = {name: {"value": v, "unit": u} for name, (v, u) in line.items()}
+    off = truth | {"north": {"value": 36.0, "low": 29.0, "high": 43.0}}
+    found = compare("line", truth, off)
+    assert found.error == pytest.approx(6.0 / 100.0) and found.covered == (True,)
+    tow = {"force": {"value": 10.0, "unit": "N"}, "direction": {"value": 90.0, "unit": "deg"}}
+    turned = tow | {"direction": {"value": 93.0, "unit": "deg"}}
+    assert compare("tow", tow, turned).error == pytest.approx(2.0 * math.sin(math.radians(1.5)))
+    limit = {"limit": {"value": 12.0, "unit": "deg"}, "actuator": {"value": "rudder", "unit": ""}}
+    near = {"limit": {"value": 13.2}, "actuator": {"value": "rudder"}}
+    assert compare("actuator_limit", limit, near).error == pytest.approx(0.1)
+
+
 def test_the_goals_table_counts_by_hand():
     answers = [
         *[answer(CURRENT, named("current"))] * 19,
