@@ -158,7 +158,8 @@ def devices_abroad(seeds: Sequence[int]) -> tuple[Planned, ...]:
         causes = _of_rule(rule, plain, devices_of(family, seed), offered(family, seed))
         drawn = np.random.default_rng([seeds[0], *f"{family} {rule} {size}".encode()])
         # of this ship, in an order that is the family's: another ship may offer a few more
-        ranked = sorted(causes, key=dict(zip(causes, drawn.random(len(causes)), strict=True)).get)
+        place = dict(zip(causes, drawn.random(len(causes)), strict=True))
+        ranked = sorted(causes, key=place.__getitem__)
         cause = ranked[count % len(ranked)]
         cases.append(Planned(str(seed), seed, cause, size, 7000, family=family))
     return tuple(cases)

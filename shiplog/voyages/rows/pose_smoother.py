@@ -31,6 +31,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -129,7 +130,9 @@ def most_probable(pieces: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[floa
     coarse = np.linspace(*RATIOS, 13)
     best = int(np.argmin([cost(one) for one in coarse]))
     low, high = coarse[max(best - 1, 0)], coarse[min(best + 1, len(coarse) - 1)]
-    found = minimize_scalar(cost, bounds=(low, high), method="bounded", options={"xatol": 0.05})
+    found: Any = minimize_scalar(
+        cost, bounds=(low, high), method="bounded", options={"xatol": 0.05}
+    )
     ratio = 10.0 ** float(found.x)
     return ratio, max(_misfit(chosen, ratio)[1], 1e-12)
 
