@@ -64,6 +64,9 @@ def plan(
             help="Plan nothing: which causes the standard manoeuvres tell apart. Any model.",
         ),
     ] = False,
+    no_causes: Annotated[
+        bool, typer.Option("--no-causes", help="Coefficients only; the store is not asked.")
+    ] = False,
     seed: Annotated[int, typer.Option(min=0, help="Of the search.")] = 0,
     store: StoreOption = STORE,
     out: Annotated[
@@ -78,6 +81,10 @@ def plan(
 
     Example: shiplog plan runs/mmg --water 600,300 --rudder 25
     """
+    if causes_only and no_causes:
+        raise UsageError(
+            "--causes-only and --no-causes leave nothing to plan.", hint="leave one of them out."
+        )
     within = _pair(speed, "--speed", "0,8")
     room = _pair(water, "--water", "600,300")
     blowing = _pair(wind, "--wind", "5,90")
@@ -97,7 +104,7 @@ def plan(
         plan_run(
             run, Store(store), out, seconds=seconds,
             rudder=None if rudder is None else math.radians(rudder), speed=within, room=room,
-            water=expected, seed=seed, causes_only=causes_only,
+            water=expected, seed=seed, causes_only=causes_only, with_causes=not no_causes,
         ),
         json_to,
     )  # fmt: skip
