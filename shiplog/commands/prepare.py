@@ -165,10 +165,17 @@ def _ingest_one(
             voyage = corrected(voyage)
         state = store.add(voyage)
     except BaseException as error:  # one bad log never ends the others; a panic is no Exception
-        done.refused[str(source or path)] = _as_said(error, source or path)
+        done.refused[str(source or path)] = _of_source(_as_said(error, path), path, source)
         return
     done.reports.append(voyage.report)
     log.info("%s: %s", voyage.name, state)
+
+
+def _of_source(error: ShiplogError, made: Path, source: Path | None) -> ShiplogError:
+    """What is said of a log that was made on the way, of the file that was given."""
+    if source is None or made.name not in error.message:
+        return error
+    return ShiplogError(error.message.replace(made.name, source.name), error.hint)
 
 
 def _as_said(error: BaseException, path: Path) -> ShiplogError:
@@ -195,14 +202,14 @@ def check_logs(paths: Sequence[Path], profile: str | None = None) -> Ingested:
     for path, logs in _opened(tracked(expand(paths), "checking", expected_s), chosen, done):
         for one in logs:
             try:
-                done.reports.append(_checked(one, chosen))
+                done.reports.append(_checked(one, chosen, None if one == path else path))
             except BaseException as error:  # one bad log never ends the others
-                done.refused[str(path)] = _as_said(error, path)
+                done.refused[str(path)] = _of_source(_as_said(error, one), one, path)
     reading_limits.end()
     return done
 
 
-def _checked(path: Path, chosen: Profile | None) -> VoyageReport:
+def _checked(path: Path, chosen: Profile | None, source: Path | None) -> VoyageReport:
     """A log's health; where a profile fits it, also what its sensors say of each other."""
     found = contents(path)
     profile, why = chosen, None
@@ -222,5 +229,6 @@ def _checked(path: Path, chosen: Profile | None) -> VoyageReport:
     except BaseException as error:  # what ingest would refuse has its health all the same
         why = error if isinstance(error, ShiplogError) else unexpected(error, path.name)
     if why is not None:
-        log.info("%s: sensors not held against each other: %s", path.stem, why.message)
+        said = _of_source(why, path, source).message
+        log.info("%s: sensors not held against each other: %s", path.stem, said)
     return replace(report, findings=(*report.findings, *findings), not_compared=not_compared)

@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 from circle_layouts import RATE, START, Voyage, direct, profile_of, same
 from made_dataflash import (
-    BLUEBOAT,
-    BOOT_S,
     FORMATS,
     circle,
     fmt,
@@ -76,7 +74,6 @@ def test_it_is_ingested_as_it_is(tmp_path, trip):
     done = ingest_logs([trip], str(tmp_path / "boat.toml"), Store(tmp_path / "store"))
     (report,) = done.reports
     assert report.name == "trip" and done.complete
-    (voyage,) = [Store(tmp_path / "store").select([])[0]]
     table = ingest(
         convert([trip], None, tmp_path / "logs").logs[0],
         profiles.load(str(tmp_path / "boat.toml")),
@@ -89,7 +86,6 @@ def test_it_is_ingested_as_it_is(tmp_path, trip):
     pulse = np.interp(at, v.t, left_us(v))
     ours = table["thruster_left"].to_numpy()
     assert np.nanmax(np.abs(ours[inside] - (pulse[inside] - 1500.0) / 400.0)) < 0.02
-    assert voyage
 
 
 def test_check_reads_the_recorders_own_file_and_a_folder_stands_for_each(tmp_path, trip):
@@ -370,7 +366,6 @@ def test_right_pulses_are_kept_as_they_are(trip):
     v = Voyage()
     assert (found["/thruster/right"].columns["pulse_us"] == right_us(v)).all()
     assert abs(found["/thruster/right"].time[0] - v.ns[0]) <= 1_000_000
-    assert BOOT_S > 0 and BLUEBOAT["SERVO3_REVERSED"] == 1
 
 
 def test_what_a_log_lacks_is_said_with_what_to_record(tmp_path):

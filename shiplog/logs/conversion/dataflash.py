@@ -149,6 +149,10 @@ class _Fixes:
         late = self.logged_us - sampled
         return np.where((sampled > 0) & (late >= 0) & (late < 2_000_000), sampled, self.logged_us)
 
+    def known(self, label: str) -> np.ndarray:
+        """Values [n] of a field, NaN where the fix is none."""
+        return np.where(self.valid, self.table.number(label), np.nan)
+
     def median_accuracy(self, label: str) -> float:
         """Of a field of GPA [m or m/s]; 0 where it has none."""
         if self.accuracy is None or not self.accuracy.has(label):
@@ -205,26 +209,24 @@ def _gnss(
 ) -> list[Series]:  # fmt: skip
     series: list[Series] = []
     for rank, one in enumerate(fixes):
-        table, end = one.table, "" if rank == 0 else f"/gps_{one.number + 1}"
-        time = clock.measured(one.utc, one.measured_us)
-
-        def known(label: str, scale: float = 1.0, table=table, one=one) -> np.ndarray:
-            return np.where(one.valid, table.number(label) * scale, np.nan)
-
         if not one.valid.any():
             continue
+        end = "" if rank == 0 else f"/gps_{one.number + 1}"
+        time = clock.measured(one.utc, one.measured_us)
         of = {"sensor": f"GPS {one.number + 1}", **({"primary": "1"} if rank == 0 else {})}
-        lever = _antenna(one.number, parameters)
-        metadata = of | lever | _sigma(one.median_accuracy("HAcc"))
-        place = {"latitude": known("Lat"), "longitude": known("Lng"), "altitude": known("Alt")}
-        fix = ("/gnss/fix", "foxglove.LocationFix", place, metadata)
-        motion = {"sog_mps": known("Spd"), "cog_deg": known("GCrs")}
-        speed = ("/gnss/velocity", "shiplog.GnssVelocity", motion,
-                 of | lever | _sigma(one.median_accuracy("SAcc")))  # fmt: skip
-        yaw = known("Yaw") if table.has("Yaw") else np.zeros(0)
+        placed = of | _antenna(one.number, parameters)
+        place = {"latitude": one.known("Lat"), "longitude": one.known("Lng"),
+                 "altitude": one.known("Alt")}  # fmt: skip
+        motion = {"sog_mps": one.known("Spd"), "cog_deg": one.known("GCrs")}
+        parts = [
+            ("/gnss/fix", "foxglove.LocationFix", place,
+             placed | _sigma(one.median_accuracy("HAcc"))),
+            ("/gnss/velocity", "shiplog.GnssVelocity", motion,
+             placed | _sigma(one.median_accuracy("SAcc"))),
+        ]  # fmt: skip
+        yaw = one.known("Yaw")
         turned = np.where(yaw == 0.0, np.nan, yaw)  # 0 of a receiver with one antenna
-        parts = [fix, speed]
-        if len(turned) and np.isfinite(turned).any():
+        if np.isfinite(turned).any():
             heading = {"heading_deg": turned % 360.0}
             parts.append(("/gnss/heading", "shiplog.Gyro", heading, {"sensor": of["sensor"]}))
         series += [
@@ -344,9 +346,6 @@ def _motors(flash: DataFlash, clock: BootClock) -> list[Series]:
     return [
         Series(f"/motor/esc_{number + 1}", "shiplog.MotorSpeed", clock.utc(one.boot_us()),
                {"rpm": one.number("RPM")})
-        for number, one in one_each(table) if (one.number("RPM") != 0.0).any()
+        for number, one in sorted(table.by_instance().items())
+        if (one.number("RPM") != 0.0).any()
     ]  # fmt: skip
-
-
-def one_each(table: Table) -> list[tuple[int, Table]]:
-    return sorted(table.by_instance().items())

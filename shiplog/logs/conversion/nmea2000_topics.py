@@ -173,10 +173,11 @@ def _track(series: list[Series]) -> magnetic.Track:
 
 def _variations(of: _Bus) -> tuple[np.ndarray, np.ndarray]:
     """Times [m] ns and variations [m] deg of 127258, of its busiest sender."""
-    known = [
-        (part.time[np.isfinite(v)], v[np.isfinite(v)] * DEG)
-        for part in of.each(127258) if (v := part.of("variation")) is not None
-    ]  # fmt: skip
+    known = []
+    for part in of.each(127258):
+        values = part.of("variation") * DEG
+        there = np.isfinite(values)
+        known.append((part.time[there], values[there]))
     none = (np.zeros(0, np.int64), np.zeros(0))
     return max(known, key=lambda one: len(one[0]), default=none)
 
