@@ -249,6 +249,32 @@ def test_what_is_none_is_blank(tmp_path):
 
 
 @needed
+def test_without_attitude_the_heading_is_that_of_the_position_message(tmp_path):
+    """GLOBAL_POSITION_INT: cm/s to north and east, 0.01 deg, 65535 for none."""
+    station = Station()
+    for i, heading in enumerate((22547, 65535, 0)):
+        boot = 1000 * i
+        station.take("SYSTEM_TIME", round((START + i) * 1e6), boot, at=START + i)
+        station.take("GLOBAL_POSITION_INT", boot, 483_861_418, 100_000_000, 0, 0, 123, -45, 0,
+                     heading, at=START + i)  # fmt: skip
+    found, _ = read(station, tmp_path)
+    np.testing.assert_array_equal(found["/gyro"].columns["heading_deg"], [225.47, np.nan, 0.0])
+    assert found["/ekf/velocity"].columns["east_mps"].tolist() == [-0.45] * 3
+    assert found["/ekf/position"].columns["latitude"].tolist() == [48.3861418] * 3
+
+
+@needed
+def test_what_has_no_time_of_its_own_has_that_of_reception(tmp_path):
+    """WIND, of which the lowest two bits of the stamp are the number of the link."""
+    station = circle()
+    station.take("WIND", 270.0, 5.0, 0.0, at=START + 7.25, links=(3,))
+    found, _ = read(station, tmp_path)
+    wind = found["/wind/true_north"]
+    assert wind.time.tolist() == [round((START + 7.25) * 1e6) * 1000]
+    assert wind.columns["direction_deg"].tolist() == [270.0]
+
+
+@needed
 def test_damage_and_a_cut_end_cost_their_frames_only(tmp_path):
     log = bytearray(circle().log)
     middle = len(log) // 2

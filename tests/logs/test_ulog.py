@@ -179,6 +179,19 @@ def test_two_subscriptions_of_one_instance_are_joined_and_instances_stay_apart(t
     assert {key: len(rows) for key, rows in found.topics.items()} == {(name, 0): 3, (name, 1): 1}
 
 
+def test_receivers_stay_apart(tmp_path):
+    """sensor_gps has an instance each, where vehicle_gps_position is not there."""
+    fields = ulog.FORMATS["vehicle_gps_position"]
+    out = ulog.header() + ulog.fmt("sensor_gps", fields)
+    out += ulog.subscribe(0, "sensor_gps", 0) + ulog.subscribe(1, "sensor_gps", 1)
+    for k in range(6):
+        out += ulog.sample(k % 2, fields, ulog.BOOT_US + k, 0, 56.0 + k % 2, 12.0, 0, 0.1, 0.8, 1.0,
+                           2.0, math.nan, 3)  # fmt: skip
+    found = topics(out, tmp_path)
+    assert found["/gnss/fix"].columns["latitude"].tolist() == [56.0] * 3
+    assert found["/gnss/fix/gps_2"].columns["latitude"].tolist() == [57.0] * 3
+
+
 def test_padding_at_the_end_may_be_there_or_not(tmp_path, flight):
     (tmp_path / "padded.ulg").write_bytes(ulog.circle(padded=True))
     padded, bare = read_ulog(tmp_path / "padded.ulg"), read_ulog(flight)

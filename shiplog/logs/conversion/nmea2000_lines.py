@@ -190,16 +190,16 @@ def _take(
     """Messages of a block into the rows of their kind and sender."""
     for (pgn, source), part in wanted.group_by("pgn", "source", maintain_order=True):
         key = int(pgn), int(source)  # type: ignore[call-overload]
-        columns = [part[name].to_list() for name in ("place", "stamp", "data")]
+        place, stamp, data = (part[name].to_list() for name in ("place", "stamp", "data"))
         if key[0] in fast:
             whole = [
-                one for row in zip(*columns, strict=True)
-                if (one := joined.add(key, *row, bus.notation.frames)) is not None
+                one for row in zip(place, stamp, data, strict=True)
+                if (one := joined.add(key, *row, frames=bus.notation.frames)) is not None
             ]  # fmt: skip
             if not whole:
                 continue
-            columns = [list(column) for column in zip(*whole, strict=True)]
-        bus.rows.setdefault(key, Rows(widths[key[0]])).add(*columns)
+            place, stamp, data = zip(*whole, strict=True)
+        bus.rows.setdefault(key, Rows(widths[key[0]])).add(place, stamp, data)
 
 
 def _parsed(block: list[str], notation: Notation) -> pl.DataFrame:

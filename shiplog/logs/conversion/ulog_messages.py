@@ -81,7 +81,9 @@ class _Reader:
         for key, several in self.parts.items():
             rows = np.concatenate(several)
             several.clear()
-            self.found.topics[key] = rows[np.argsort(rows["timestamp"], kind="stable")]
+            ordered = (rows["timestamp"][1:] >= rows["timestamp"][:-1]).all()
+            order = slice(None) if ordered else np.argsort(rows["timestamp"], kind="stable")
+            self.found.topics[key] = rows[order]
 
     def _part(self, stream: BinaryIO, begin: int, end: int, last: bool) -> None:
         """The messages from one byte of the file to another; what is cut off at the end of a part
@@ -116,8 +118,12 @@ class _Reader:
         """Samples from `at` on, and what stands between them; where they stopped."""
         block = self.raw[at:]
         heads = np.flatnonzero(block[2:-2] == SAMPLE)
-        sizes = block[heads].astype(np.int64) | block[heads + 1].astype(np.int64) << 8
-        numbers = block[heads + 3].astype(np.int64) | block[heads + 4].astype(np.int64) << 8
+        if len(block) < HEAD_BYTES + NUMBER_BYTES:
+            return at
+        two = sliding_window_view(block, 2)
+        heads = heads[heads + 4 < len(block)]
+        sizes = two[heads].view("<u2").reshape(-1).astype(np.int64)
+        numbers = two[heads + HEAD_BYTES].view("<u2").reshape(-1).astype(np.int64)
         known = (sizes == self.least[numbers]) | (sizes == self.padded[numbers])
         heads, sizes, numbers = heads[known], sizes[known], numbers[known]
         after = heads + HEAD_BYTES + sizes
@@ -154,14 +160,13 @@ class _Reader:
         """Samples [n] of a subscription; padding at the end may be missing."""
         dtype = self._dtype(self.named[number][0])
         assert dtype is not None, number
-        rows = np.zeros(len(begin), dtype)
+        whole = np.zeros((len(begin), dtype.itemsize), np.uint8)
+        first = begin + HEAD_BYTES + NUMBER_BYTES
         for length in np.flatnonzero(np.bincount(size)).tolist():
-            same = size == length
+            same = np.flatnonzero(size == length)
             taken = min(length - NUMBER_BYTES, dtype.itemsize)
-            part = np.zeros((int(same.sum()), dtype.itemsize), np.uint8)
-            first = begin[same] + HEAD_BYTES + NUMBER_BYTES
-            part[:, :taken] = sliding_window_view(self.raw, taken)[first]
-            rows[same] = part.view(dtype).reshape(-1)
+            whole[same, :taken] = sliding_window_view(self.raw, taken)[first[same]]
+        rows = whole.view(dtype).reshape(-1)
         self.parts.setdefault(self.named[number], []).append(rows)
 
     def _one(self, at: int, final: bool) -> int:
@@ -249,5 +254,6 @@ def _least(dtype: np.dtype) -> int:
         names.pop()
     if not names:
         return dtype.itemsize
-    last = (dtype.fields or {})[names[-1]]
-    return int(last[1]) + last[0].itemsize
+    offsets = {name: part for name, part in (dtype.fields or {}).items()}
+    kind, offset, *_ = offsets[names[-1]]
+    return int(offset) + kind.itemsize

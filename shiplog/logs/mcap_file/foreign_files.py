@@ -50,6 +50,10 @@ def _both(one: Test, other: Test) -> Test:
     return lambda start, path: one(start, path) and other(start, path)
 
 
+def _either(*tests: Test) -> Test:
+    return lambda start, path: any(test(start, path) for test in tests)
+
+
 def _text(pattern: str) -> Test:
     compiled = re.compile(pattern.encode(), re.MULTILINE)
     return lambda start, path: compiled.search(start[:4096].lstrip(BLANKS)) is not None
@@ -123,6 +127,10 @@ KINDS = (
          "its NMEA 0183 sentences as a text, one a line; shiplog reads both",
          _begins(b"\xd4\xc3\xb2\xa1", b"\xa1\xb2\xc3\xd4", b"\x4d\x3c\xb2\xa1",
                  b"\xa1\xb2\x3c\x4d", b"\x0a\x0d\x0d\x0a")),
+    Kind("a trace of a CAN bus", "make a candump log of it with can_logconvert of the Python "
+         "package python-can: can_logconvert {file} {stem}.log; shiplog reads that where the bus "
+         "is NMEA 2000", _either(_begins(b"LOGG"), _text(r"\A;\$FILEVERSION="),
+                                 _text(r"\Adate .*\s+base (hex|dec)"))),
     Kind("a Signal K log", "let the server write NMEA 0183, with its plugin "
          "signalk-to-nmea0183, and log that; or make a table of it, one row a time and one column "
          "a path; " + TABLE, _both(_json, _text(r'"updates"'))),
@@ -195,6 +203,7 @@ def refuse_binary(path: Path, name: str) -> None:
     if is_binary(path):
         raise LogUnreadable(
             f"{name} is binary, and of no kind that shiplog knows.",
-            hint="shiplog reads MCAP logs, ROS bags, NMEA 0183 text, and CSV or Parquet tables: "
-            "export it as one of them with the program that recorded it.",
+            hint="shiplog reads MCAP logs, ROS bags, recorders' files (ArduPilot, MAVLink, NMEA "
+            "2000, PX4), NMEA 0183 text, and CSV or Parquet tables: export it as one of them with "
+            "the program that recorded it.",
         )
