@@ -29,6 +29,7 @@ from shiplog.logs.conversion.table_files import read_table
 from shiplog.nomenclature import units
 from shiplog.ship_profile.table_channels import TABLE_CHANNELS
 
+EVEN = 0.01  # of a step: a column that rises so evenly counts, and measures nothing
 SINGLE = {  # where the contract puts a sensor of a table: topic, fields, units
     ("position", "geodetic"): ("/gnss/fix", ("latitude", "longitude"), ("deg",)),
     ("position", "local"): ("/ship/state", ("x0_m", "y0_m"), ("m",)),
@@ -104,11 +105,24 @@ def draft_table(path: Path, vessel: str | None = None) -> str:
 
 
 def _nameless(values: pl.Series) -> str:
-    """What to say of a column that no line names."""
+    """What to say of a column that no line names: what counts evenly may be the time."""
+    step = _even_step(values)
+    channel, counts = ("time", f"it counts by {step:g}; ") if step else ("...", "")
+    unit = ', unit = "s"' if step else ""
     return (
-        f'# {quoted(values.name)} = {{ channel = "..." }}  # CHECK: no line of the table names it; '
-        f"{facts.of_values(values)}"
+        f'# {quoted(values.name)} = {{ channel = "{channel}"{unit} }}  # CHECK: no line of the '
+        f"table names it; {counts}{facts.of_values(values)}"
     )
+
+
+def _even_step(values: pl.Series) -> float:
+    """By how much a column rises from each row to the next, if always by as much; else 0."""
+    if not values.dtype.is_numeric() or values.null_count() or len(values) < facts.FEW:
+        return 0.0
+    steps = np.diff(values.cast(pl.Float64).to_numpy())
+    step = float(np.median(steps))
+    even = step > 0.0 and float(np.abs(steps - step).max()) < EVEN * step
+    return float(f"{step:.6g}") if even else 0.0
 
 
 def _of_numbers(rows: pl.DataFrame, labels: set[str]) -> pl.DataFrame:

@@ -23,6 +23,15 @@ def written(tmp_path, content: bytes, name="trial.dat"):
     return path
 
 
+def test_the_draft_of_a_matrix_asks_for_each_row_and_says_which_one_counts(tmp_path):
+    rows = np.stack((TIME, 2.0 * np.sin(TIME), np.cos(TIME)))
+    text = draft(written(tmp_path, level_4("<", trial=rows)))
+    (time,) = [line for line in text.splitlines() if line.startswith('# "trial_1"')]
+    assert 'channel = "time", unit = "s"' in time
+    assert "it counts by 0.1;" in time
+    assert 'channel = "..." }  # CHECK: no line of the table names it' in text
+
+
 @pytest.mark.parametrize("order", ["<", ">"])
 def test_the_rows_of_a_matrix_of_version_4_are_columns_without_names(tmp_path, order):
     rows = np.stack((TIME, 2.0 * TIME, np.cos(TIME)))
@@ -168,3 +177,46 @@ unit = "deg"
 "y" = { channel = "y0", unit = "m" }
 "psi" = { channel = "heading", unit = "rad" }
 """
+
+
+@pytest.mark.parametrize("version", ["4", "5", "7.3"])
+def test_a_folder_of_trials_is_ingested_as_the_same_voyages_in_a_table_are(tmp_path, version):
+    """The matrix, vectors or struct of two circles, straight into a store; and their CSV."""
+    from shiplog.commands.prepare import expand, ingest_logs
+    from shiplog.voyages.store.store import Store
+
+    if version == "7.3":
+        pytest.importorskip("matio", reason="the extra `matlab` is not installed")
+    profile = tmp_path / "trial.toml"
+    names = ("when", "x", "y", "psi")
+    text = PROFILE.replace('unit = "d"', 'unit = "s"')
+    if version == "4":
+        for place, name in enumerate(names, 1):
+            text = text.replace(f'"{name}" =', f'"run_{place}" =')
+            names = tuple(f"run_{place}" if one == name else one for one in names)
+    profile.write_text(text)
+    (tmp_path / "mat").mkdir()
+    (tmp_path / "csv").mkdir()
+    time = 0.1 * np.arange(400)
+    for trial, radius in (("a", 3.0), ("b", 4.0)):
+        psi = 0.3 * time / radius
+        columns = (time, radius * np.sin(psi), -radius * np.cos(psi), np.angle(np.exp(1j * psi)))
+        path = tmp_path / "mat" / f"{trial}.mat"
+        if version == "4":
+            path.write_bytes(level_4("<", run=np.stack(columns)))
+        elif version == "5":
+            path.write_bytes(level_5("<", **dict(zip(names, columns, strict=True))))
+        else:
+            write_7_3(path, run=dict(zip(names, columns, strict=True)))
+        rows = [",".join(repr(float(v)) for v in row) for row in zip(*columns, strict=True)]
+        (tmp_path / "csv" / f"{trial}.csv").write_text("\n".join([",".join(names), *rows]))
+    stores = []
+    for kind in ("mat", "csv"):
+        store = Store(tmp_path / f"store_{kind}")
+        paths = expand([tmp_path / kind]) if kind == "mat" else [
+            tmp_path / "csv" / "a.csv", tmp_path / "csv" / "b.csv"
+        ]  # fmt: skip
+        done = ingest_logs(paths, str(profile), store)
+        assert done.refused == {}
+        stores.append([frame.collect() for frame in store.tables(["a", "b"])])
+    assert all(one.equals(other) for one, other in zip(*stores, strict=True))

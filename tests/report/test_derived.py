@@ -51,8 +51,8 @@ def test_reports_say_what_was_measured_and_what_was_derived():
     lines = tables.voyage_lines(
         VoyageReport("one", 9, 0, 9, 9.0, usable_s=9, windows=0, derived=(SURGE, YAW))
     )
-    assert "surge to 0.004 m/s, yaw rate to 0.08 deg/s" in lines[1]
-    assert "0.01 m of a position and 0.1 deg of a heading" in lines[1]
+    assert "surge ± 0.004 m/s, yaw rate ± 0.08 deg/s" in lines[1]
+    assert "a position scatters by 0.01 m, a heading scatters by 0.1 deg" in lines[1]
     assert "A perfect model would have L" in derived.loss_sentence((SURGE, YAW), 99.0)
     assert derived.loss_sentence((), 99.0) == ""
 

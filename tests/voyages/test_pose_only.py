@@ -127,6 +127,20 @@ def test_a_position_that_steps_begins_a_new_segment_and_bends_no_velocity(tmp_pa
     assert np.abs(usable(found, "surge") - SPEED).max() < 0.05
 
 
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_an_axis_counted_to_port_is_told_by_the_heading_alone(tmp_path, mirrored):
+    """As of a capture whose z points upwards: the way turns to port, the heading to starboard."""
+    parts = noisy(300.0)
+    parts["/position"].columns["y_m"] *= -1.0 if mirrored else 1.0
+    text = POSE.replace("lever_arm_m = [0.7, -0.2]", "lever_arm_m = [0.0, 0.0]")
+    found = voyage(tmp_path, parts, text)
+    clashes = found.report.contradictions
+    assert len(clashes) == mirrored
+    if mirrored:
+        assert "position is mirrored" in clashes[0].sentence
+        assert "sign = [1.0, -1.0] on [sensors.position]" in clashes[0].sentence
+
+
 def test_no_diagnosis_counts_a_derived_channel(tmp_path):
     from shiplog.diagnosis.linear import segments
 

@@ -131,9 +131,14 @@ NEEDS: Mapping[str, Callable[[Setting], str | None]] = {
         lambda s: s.profile.sensors.velocity is not None,
         "no velocity is recorded: it is derived from the position, and has its clock",
     ),
-    "body velocity": _unless(
-        lambda s: s.profile.sensors.kind("velocity") == "body",
-        "no velocity is recorded in body axes",
+    "body velocity": lambda s: (
+        None
+        if s.profile.sensors.kind("velocity") == "body"
+        else (
+            "no velocity is recorded"
+            if s.profile.sensors.velocity is None
+            else "the velocity is recorded over ground"
+        )
     ),
     "wind": _unless(lambda s: s.profile.has_wind, "no wind is recorded"),
     "wind force": _unless(lambda s: not s.lacking, "the model feels no wind"),

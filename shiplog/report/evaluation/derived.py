@@ -34,16 +34,16 @@ def of_voyages(derived: Sequence[DerivedChannel]) -> str:
     if not derived:
         return ""
     known = ", ".join(
-        f"{_words([one.channel])} to {figure(one.sigma)} {one.unit}" for one in derived
+        f"{_words([one.channel])} ± {figure(one.sigma)} {one.unit}" for one in derived
     )
     sources = {one.of: one for one in derived}
-    samples = " and ".join(
-        f"{figure(one.sample_sigma)} {'m' if of == 'position' else 'deg'} of a {of}"
+    samples = ", ".join(
+        f"a {of} scatters by {figure(one.sample_sigma)} {'m' if of == 'position' else 'deg'}"
         for of, one in sources.items()
     )
     return (
-        f"derived by a Kalman smoother, none of them measured: {known} (one standard deviation, "
-        f"of {samples})"
+        f"derived by a Kalman smoother, none of them measured: {known} (one standard deviation; "
+        f"{samples})"
     )
 
 

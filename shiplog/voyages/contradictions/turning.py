@@ -197,7 +197,7 @@ def heading_and_way(e: Evidence) -> Iterator[Finding]:
         yield large
         return
     wrong = [one for one in e.ways if one.how != "as it is"]
-    needed = 1 if e.t.body else 2
+    needed = 1 if e.t.body or e.t.derived else 2  # one way, if velocity is derived
     if len(wrong) < needed or len(wrong) < len(e.ways):
         return
     way = max(wrong, key=lambda one: one.left)
@@ -228,7 +228,10 @@ def _mirrored(e: Evidence, angle: float, half: float) -> Finding:
     if with_rate:
         line += f" and {sign_line(p, 'yaw_rate')}"
     counted = "anticlockwise from east" if east else "anticlockwise"
-    other = " (or the position is mirrored)" if e.t.body else ""
+    other = " (or the position is mirrored)" if e.t.body or e.t.derived else ""
+    if e.t.derived and p.sensors.kind("position") == "local":
+        order = "the order of `fields` on [sensors.position]"
+        line += f", or {order if east else sign_line(p, 'position', 1)}"
     sentence = (
         f"The heading{also} turns against the way over ground{other}, as one that is counted "
         f"{counted} would. Change: {line}."
