@@ -134,7 +134,9 @@ def test_a_fit_without_the_discrepancy_is_not_that_of_the_cache(monkeypatch):
 def test_without_form_errors_no_cause_has_one(acts):
     """An allowance of a fifth squared of 5000 nats, or none."""
     coarse = [cause for cause in CATALOGUE if cause.form_error]
-    assert {cause.name: cause.form_error for cause in coarse} == {"bank": 0.2, "shallow_water": 0.2}
+    assert {cause.name: cause.form_error for cause in coarse} == {
+        "bank": 0.2, "shallow_water": 0.2, "contact": 0.2, "line": 0.1, "tow": 0.1,
+    }  # fmt: skip
     by, alone = {cause.label: cause for cause in coarse}, {"bank": 5000.0}
     scale = Scale(Priors(coarse, ()), {}, by, alone, 0.0, form_errors=acts)
     labels = ("bank", "shallow_water")
