@@ -190,6 +190,7 @@ def test_who_calls_at_the_wall_comes_to_its_fenders_and_not_through_them(family)
     leg = case.trial[3]
     v = cases.voyage(case, leg)
     gap = case.ship.bank_east - 0.5 * case.ship.body.breadth - v.y0
+    assert case.effects.contact is not None
     assert 0.01 < np.mean(gap < case.effects.contact.reach) < 0.4
     assert gap.min() > -0.25 * case.ship.length
 

@@ -27,7 +27,8 @@ from shiplog.voyages.store.store import Store
 
 DEGREE = np.pi / 180.0
 AT_STOP = 0.97  # of the limit: from there on a unit stands at its stop
-MOVED = 1e-3  # of the largest value: what is less is no motion and no order
+MOVED = 1e-3  # of the largest value: what is less is no motion
+NEUTRAL = 0.03  # of the largest value: what is less is no order, a pulse's neutral and its trim
 STEADY = 0.15  # of the rate: how even a ramp is
 SHORTEST = 4  # rows of a ramp
 LEAST = 0.03  # share of the rows that a fault has to change, or it is none
@@ -44,15 +45,15 @@ HSVA_PLAY = 3.0 * DEGREE
 
 
 def beyond_stop(acted: np.ndarray, limit: float, order: float) -> np.ndarray:
-    """The order where what acted stands at `limit`: `order`. Raises ShiplogError where it went
-    farther."""
+    """The order where what acted stands at `limit`: `order`. A voyage that does not come there is
+    left alone. Raises ShiplogError where it went farther."""
     if np.nanmax(np.abs(acted)) > limit * 1.01:
         raise ShiplogError(
             f"What acted reached {np.nanmax(np.abs(acted)):.3g}, beyond the limit of {limit:.3g}.",
             hint="choose voyages that stay below it, or a larger limit.",
         )
     at = np.abs(acted) >= AT_STOP * limit
-    return _changed(acted, np.where(at, np.copysign(order, acted), acted), "stands at that limit")
+    return np.where(at, np.copysign(order, acted), acted)
 
 
 def before_ramps(acted: np.ndarray, time: np.ndarray, rate: float) -> np.ndarray:
@@ -61,9 +62,11 @@ def before_ramps(acted: np.ndarray, time: np.ndarray, rate: float) -> np.ndarray
     order = acted.copy()
     begin = 0
     for end in range(1, len(slope) + 1):
-        if end < len(slope) and slope[end] * slope[begin] > 0.0 and _even(slope[end], rate):
+        ramp = _even(slope[begin], rate)
+        same = end < len(slope) and slope[end] * slope[begin] > 0.0 and _even(slope[end], rate)
+        if ramp and same:
             continue
-        if _even(slope[begin], rate) and end - begin >= SHORTEST:
+        if ramp and end - begin >= SHORTEST:
             order[begin + 1 : end + 1] = acted[end]
         begin = end
     return _changed(acted, order, f"moves at {rate:.3g} per second")
@@ -74,7 +77,7 @@ def _even(slope: float, rate: float) -> bool:
 
 
 def before_dead_zone(acted: np.ndarray, half: float) -> np.ndarray:
-    large = np.abs(acted) > MOVED * np.nanmax(np.abs(acted))
+    large = np.abs(acted) > NEUTRAL * np.nanmax(np.abs(acted))
     return _changed(acted, acted + np.where(large, np.copysign(half, acted), 0.0), "moves at all")
 
 

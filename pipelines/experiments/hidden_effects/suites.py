@@ -157,9 +157,8 @@ def devices_abroad(seeds: Sequence[int]) -> tuple[Planned, ...]:
         plain = [name for name in offered(family, seed) if name not in outside]
         causes = _of_rule(rule, plain, devices_of(family, seed), offered(family, seed))
         drawn = np.random.default_rng([seeds[0], *f"{family} {rule} {size}".encode()])
-        # of this ship, in an order that is the family's: another ship may offer a few more
-        place = dict(zip(causes, drawn.random(len(causes)), strict=True))
-        ranked = sorted(causes, key=place.__getitem__)
+        # of this ship: another one of the family may offer a few more
+        ranked = [causes[i] for i in drawn.permutation(len(causes))]
         cause = ranked[count % len(ranked)]
         cases.append(Planned(str(seed), seed, cause, size, 7000, family=family))
     return tuple(cases)

@@ -20,7 +20,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         prog=PROGRAM, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     commands = parser.add_subparsers(dest="what", required=True)
-    known = ", ".join((*cases.CATALOGUE, *cases.OUTSIDE))
+    known = ", ".join((*cases.CATALOGUE, *cases.DEVICES, *cases.OUTSIDE))
     case = commands.add_parser(
         "case", help="one blind case",
         epilog=f"Causes: none, {known}; a ship offers those for which it has the device.",

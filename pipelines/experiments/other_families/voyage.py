@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
@@ -47,7 +47,7 @@ class Voyage:
     from_ahead: np.ndarray  # m/s, where the apparent wind comes from, at midship
     from_starboard: np.ndarray
     pulses: tuple[Pulse, ...] = ()
-    heel: np.ndarray | None = None  # rad, starboard side down, of a ship that rolls
+    heel: np.ndarray = field(default_factory=lambda: np.zeros(0))  # rad, of a ship that rolls
 
 
 def sail(
@@ -103,7 +103,7 @@ def sail(
     return Voyage(
         ship, effects, duration, time, x, y, psi, u, v, r, seen[:, 6 : 6 + count].copy(),
         north * cos + east * sin + u, east * cos - north * sin + v, pulses,
-        seen[:, -2].copy() if ship.roll else None,
+        seen[:, -2].copy() if ship.roll else np.zeros(0),
     )  # fmt: skip
 
 

@@ -35,7 +35,7 @@ def main(arguments: list[str]) -> None:
 
 
 def _case(arguments: list[str]) -> None:
-    known = ", ".join((*cases.CATALOGUE, *cases.OUTSIDE))
+    known = ", ".join((*cases.CATALOGUE, *cases.DEVICES, *cases.OUTSIDE))
     parser = argparse.ArgumentParser(prog=f"{PROGRAM} case", epilog=f"Causes: none, {known}.")
     parser.add_argument("seed", type=int)
     parser.add_argument("folder", help="where nominal_1.mcap to trial_6.mcap go")
