@@ -130,8 +130,8 @@ def with_number(content, place, number):
 EVERY_NUMBER = tomllib.loads(
     """
 ship = { name = "s", length_m = 3.0, breadth_m = 0.5, draught_m = 0.2, mass_kg = 250.0, \
-x_g_m = 0.1, block_coefficient = 0.8, frontal_area_m2 = 0.1, lateral_area_m2 = 0.5, \
-outline = [[1.5, 0.0], [-1.5, 0.2], [-1.5, -0.2]] }
+full_load_draught_m = 0.3, x_g_m = 0.1, block_coefficient = 0.8, frontal_area_m2 = 0.1, \
+lateral_area_m2 = 0.5, outline = [[1.5, 0.0], [-1.5, 0.2], [-1.5, -0.2]] }
 site = { banks = [[[0.0, 0.0], [10.0, 0.0]]], depth_m = 5.0, density = 1e3, datum = [35.0, 139.0] }
 [sensors]
 position = { topic = "/p", fields = ["a", "o"], unit = "deg", lever_arm_m = [1.0, 0.1], \

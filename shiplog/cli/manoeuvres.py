@@ -39,6 +39,13 @@ def manoeuvres(
     scale: Annotated[
         float, typer.Option(help="How many times the ship is longer than its model (Froude).")
     ] = 1.0,
+    full_load: Annotated[
+        bool,
+        typer.Option(
+            "--full-load",
+            help="Also at the profile's full_load_draught_m, from what was measured in ballast.",
+        ),
+    ] = False,
     members: Annotated[
         int, typer.Option(min=1, help="Draws of a model for its intervals; 1 for none.")
     ] = 100,
@@ -82,7 +89,7 @@ def manoeuvres(
 
     found = manoeuvres_of(
         runs or [], None if alone else Store(store), voyages or [], cause or [], scale=scale,
-        members=members,
+        members=members, full_load=full_load,
     )  # fmt: skip
     answer(found, json_to)
     write_pages(found, *pages)

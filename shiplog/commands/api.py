@@ -414,18 +414,20 @@ def find_manoeuvres(
     *,
     scale: float = 1.0,
     members: int = 100,
+    full_load: bool = False,
     causes: Files = (),
 ) -> ManoeuvreSheet:
     """Turns, zigzags, stops, pull-outs and spirals of these voyages, all of the store where none
     is named: measured, and sailed by a run and an extended one. Without `store`, what the runs
-    sail by the book. `scale`: how many times the ship is longer than its model. Raises
-    ShiplogError."""
+    sail by the book. `scale`: how many times the ship is longer than its model. `full_load`: also
+    at the profile's second draught. Raises ShiplogError."""
     from shiplog.commands import manoeuvres as finding
 
     where = None if store is None else Store(_path(store))
     return finding.manoeuvres_of(
-        _runs(runs), where, _names(voyages), _files(causes), scale=scale, members=members
-    )
+        _runs(runs), where, _names(voyages), _files(causes), scale=scale, members=members,
+        full_load=full_load,
+    )  # fmt: skip
 
 
 def _path(store: AnyStore) -> Path:

@@ -33,6 +33,7 @@ def manoeuvres_of(
     *,
     scale: float = 1.0,
     members: int = MEMBERS,
+    full_load: bool = False,
 ) -> ManoeuvreSheet:
     """Of these voyages, all of the store where none is named; of the runs alone without a store.
     Raises ShiplogError."""
@@ -44,7 +45,7 @@ def manoeuvres_of(
     for run in runs:
         refuse_other_columns(run, profile.columns, "the chosen voyages")
         refuse_other_profile(run, profile, "the chosen voyages")
-    made = sheets.make(profile, store, names, runs, scale, members)
+    made = sheets.make(profile, store, names, runs, scale, members, full_load)
     shown = Shown(lambda: drawing.Plots(made.entries), lambda: html.render(pages.of_sheet(made)))
     return ManoeuvreSheet(made, shown)
 

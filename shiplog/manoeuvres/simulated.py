@@ -40,12 +40,14 @@ class Simulated:
     outside      where the model left its training data
     diverged     share of the members that did
     sailed       all members
+    each         the quantities of each of them
     """
 
     quantities: Mapping[str, Estimate]
     outside: Outside
     diverged: float
     sailed: Sailed
+    each: Sequence[Mapping[str, float]]
 
     @property
     def note(self) -> str:
@@ -127,13 +129,12 @@ def _of_pull_out(track: Track, of: PullOut) -> dict[str, float]:
     return steadiness.residual(track, list(zip(sides, ends, strict=False)))
 
 
-def intervals(
-    sailed: Sailed, manoeuvre: Manoeuvre, profile: Profile, note: str = "",
-    taken_out: bool = False,
-) -> dict[str, Estimate]:  # fmt: skip
-    """Each quantity of the first member, with the middle 90 % of all of them."""
+def of_members(
+    sailed: Sailed, manoeuvre: Manoeuvre, profile: Profile, taken_out: bool = False
+) -> list[dict[str, float]]:
+    """Quantities of each member, the model as it stands first; none of a model that diverged."""
     if np.isfinite(sailed.diverged[0]):
-        return {}
+        return [{}]
 
     def of(member: int) -> dict[str, float]:
         moved = None
@@ -142,8 +143,12 @@ def intervals(
             moved = drift.of_turn(track, 0.0, math.copysign(1.0, manoeuvre.angle))
         return measure(sailed, member, manoeuvre, profile, moved)
 
-    best = of(0)
-    others = [of(k) for k in range(1, len(sailed))]
+    return [of(k) for k in range(len(sailed))]
+
+
+def intervals(each: Sequence[Mapping[str, float]], note: str = "") -> dict[str, Estimate]:
+    """Each quantity of the first member, with the middle 90 % of the others."""
+    best, *others = each
     found = {}
     for name, value in best.items():
         many = [one[name] for one in others if name in one]
@@ -155,26 +160,33 @@ def intervals(
     return found
 
 
-def sail(
-    sailor: Sailor, manoeuvre: Manoeuvre, members: int = MEMBERS, **how
-) -> Simulated:  # fmt: skip
+def of_sailed(
+    sailed: Sailed, outside: Outside, manoeuvre: Manoeuvre, profile: Profile, taken_out: bool
+) -> Simulated:
+    each = of_members(sailed, manoeuvre, profile, taken_out)
+    note = OUTSIDE_NOTE if outside.anywhere else ""
+    lost = float(np.isfinite(sailed.diverged).mean())
+    return Simulated(intervals(each, note), outside, lost, sailed, each)
+
+
+def sail(sailor: Sailor, manoeuvre: Manoeuvre, members: int = MEMBERS, **how) -> Simulated:
     """A manoeuvre by the book; `how` as for `Sailor.sail`."""
     sailed, outside = sailor.sail(manoeuvre, members=members, **how)
-    note = OUTSIDE_NOTE if outside.anywhere else ""
-    return Simulated(
-        intervals(sailed, manoeuvre, sailor.profile, note),
-        outside,
-        float(np.isfinite(sailed.diverged).mean()),
-        sailed,
-    )
+    return of_sailed(sailed, outside, manoeuvre, sailor.profile, False)
 
 
 def beside(
-    sailor: Sailor, found: Found, record: Record, corrected: bool, members: int = MEMBERS
+    sailor: Sailor,
+    found: Found,
+    record: Record,
+    corrected: bool,
+    members: int = MEMBERS,
+    revolutions: bool = True,
 ) -> Simulated | None:
     """The same manoeuvre as a recorded one: its angles, its approach, its wind, its revolutions.
 
-    corrected   whether a current was taken out of the record; the model has none
+    corrected    whether a current was taken out of the record; the model has none
+    revolutions  those of the record; else what keeps the model at that speed
 
     None of a kind that is not sailed by itself, or where the ship was not under way.
     """
@@ -192,7 +204,7 @@ def beside(
         wind = (float(north), float(east))
     seconds = LONGER * (found.end - found.begin)
     driven = record.actuator[during] if during.any() else record.actuator[:1]
-    approach = np.median(driven, axis=0)
+    approach = np.median(driven, axis=0) if revolutions else None
     positions = None
     if found.kind == "stop" and during.any():  # an engine's orders are its own: as recorded
         positions = record.time[during] - found.begin, driven
@@ -205,9 +217,7 @@ def beside(
         approach=approach, motion=(float(state[4]), float(state[3]), float(state[5])),
         positions=positions,
     )  # fmt: skip
-    note = OUTSIDE_NOTE if outside.anywhere else ""
-    quantities = intervals(sailed, manoeuvre, sailor.profile, note, corrected)
-    return Simulated(quantities, outside, float(np.isfinite(sailed.diverged).mean()), sailed)
+    return of_sailed(sailed, outside, manoeuvre, sailor.profile, corrected)
 
 
 def of_found(found: Found) -> Manoeuvre | None:

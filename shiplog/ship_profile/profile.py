@@ -7,9 +7,14 @@ contract's words. `profile_sources` has the sensors and actuators; `profile_file
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import (
+    Field,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
 
 from shiplog.exceptions import ProfileError, listed, nearest
 from shiplog.nomenclature import channels
@@ -52,6 +57,10 @@ class Ship(Section):
     )  # fmt: skip
     breadth_m: Length | None = Field(default=None, description="m")
     draught_m: Length | None = Field(default=None, description="m")
+    full_load_draught_m: Length | None = Field(
+        default=None, description="at full load, m, where `draught_m` is that of a ballast "
+        "condition; for `manoeuvres --full-load`"
+    )  # fmt: skip
     mass_kg: float | None = Field(
         default=None, ge=LIGHTEST_KG, le=HEAVIEST_KG, description="kg"
     )  # fmt: skip
@@ -64,6 +73,14 @@ class Ship(Section):
     outline: tuple[tuple[Place, Place], ...] | None = Field(
         default=None, description="of the hull as it is drawn: points [ahead, starboard], m"
     )
+
+    @model_serializer(mode="wrap")
+    def _as_it_was(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without what is new and left out: a stored voyage is known by its profile's text."""
+        found = plain(self)
+        if self.full_load_draught_m is None:
+            del found["full_load_draught_m"]
+        return found
 
     @property
     def breadth(self) -> float:

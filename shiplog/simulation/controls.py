@@ -66,9 +66,12 @@ class Controls:
         rate = np.minimum(self.rate, FASTEST)[None, :]
         way = ordered - now
         moving = np.minimum(np.abs(way) / rate, left)
-        end = now + np.copysign(rate * moving, way)
+        # where it arrives it is there, and not beside it by what is rounded: of a stopped screw's
+        # revolutions a model divides
+        there = np.abs(way) <= rate * left
+        end = np.where(there, ordered, now + np.copysign(rate * moving, way))
         mean = now * after[:, None] + 0.5 * (now + end) * moving + end * (left - moving)
-        return end, mean / step
+        return end, np.where(way == 0.0, ordered, mean / step)
 
 
 def untouched(names: tuple[str, ...]) -> Controls:

@@ -2,7 +2,6 @@
 
 import math
 
-import numpy as np
 import polars as pl
 import pytest
 from commands import call
@@ -140,16 +139,6 @@ def test_a_sheet_by_the_model_alone(whole, tmp_path):
             assert quantity["measured"] is None and quantity["simulated"]["value"] is not None
     assert all("<script" not in page.read_text() for page in pages)
     assert "A.601(15)" in pages[1].read_text() and "Performance may differ" in pages[2].read_text()
-
-
-def test_froude_scales_times_and_nothing_else(whole):
-    one, ten = (shiplog.find_manoeuvres(whole, members=1, scale=s).frame for s in (1.0, 100.0))
-    keys = ["manoeuvre", "quantity"]
-    both = one.join(ten, on=keys, suffix="_ship")
-    factor = both["simulated_ship"] / both["simulated"]
-    of = {"s": 10.0, "deg/s": 0.1}
-    for unit, value in zip(both["unit"], factor, strict=True):
-        assert value == pytest.approx(of.get(unit, 1.0)) or not np.isfinite(value)
 
 
 def test_manoeuvres_of_voyages_without_any(store):

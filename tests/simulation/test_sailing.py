@@ -100,6 +100,16 @@ def test_the_rudder_takes_its_time():
     assert angles == pytest.approx([5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 35.0])
 
 
+def test_a_screw_that_is_stopped_stands():
+    """To the last bit: what a model divides by is no rounding error."""
+    slow = Controls(NAMES, np.array([1.0, 0.0]), np.array([0.0, 0.7]), np.zeros(2),
+                    np.array([-0.7, 0.0]), np.array([0.7, 1.0]), np.array([1e9, 0.3]))  # fmt: skip
+    now, none = np.array([[0.0, 0.7]]), np.zeros(1)
+    for _ in range(4):
+        now, mean = slow.moved(now, np.zeros((1, 2)), none, 1.0)
+    assert now.tolist() == mean.tolist() == [[0.0, 0.0]]
+
+
 def test_a_current_carries_the_ship_and_nothing_else():
     of, water = Turn(math.radians(20.0)), Water(current=(0.5, -0.3))
     sticks = controls()

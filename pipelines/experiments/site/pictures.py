@@ -121,7 +121,8 @@ HOUSE = (  # package, what it holds; from below, which is what is imported by al
      ("drafting", "of profiles")),
     (("models", "mmg, networks, causes"), ("simulation", "rollouts, L, coverage"),
      ("training", "recipes, runs")),
-    (("diagnosis", "segments to verdict"), ("report", "page, figures, viewer")),
+    (("diagnosis", "segments to verdict"), ("manoeuvres", "found, measured, sailed"),
+     ("report", "page, figures, viewer")),
     (("commands", "steps of each command"), ("cli", "arguments, printing")),
 )  # fmt: skip
 

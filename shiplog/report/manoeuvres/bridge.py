@@ -10,7 +10,8 @@ import math
 from collections.abc import Sequence
 from importlib.metadata import version
 
-from shiplog.manoeuvres.sheet import Entry, Sheet
+from shiplog.manoeuvres.entry import Entry
+from shiplog.manoeuvres.sheet import Sheet
 from shiplog.nomenclature.numbers import figure
 from shiplog.report.manoeuvres import drawing
 from shiplog.report.manoeuvres.sheet import value

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from shiplog.manoeuvres.sheet import Drawn, Entry
+from shiplog.manoeuvres.entry import Drawn, Entry
 from shiplog.report import colours
 from shiplog.report.figures import style
 from shiplog.report.page.blocks import Drawn as Picture

@@ -7,9 +7,10 @@ from importlib.metadata import version
 
 from shiplog.exceptions import listed
 from shiplog.manoeuvres.criteria import SHIPS
+from shiplog.manoeuvres.entry import Entry
+from shiplog.manoeuvres.entry import Line as Quantity
 from shiplog.manoeuvres.quantity import Estimate
-from shiplog.manoeuvres.sheet import Entry, Sheet
-from shiplog.manoeuvres.sheet import Line as Quantity
+from shiplog.manoeuvres.sheet import Sheet
 from shiplog.nomenclature.numbers import counted
 from shiplog.report.manoeuvres import drawing
 from shiplog.report.manoeuvres.sheet import (

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import polars as pl
 
 from shiplog.manoeuvres.conditions import beaufort
+from shiplog.manoeuvres.entry import Entry, Line
 from shiplog.manoeuvres.quantity import Estimate
-from shiplog.manoeuvres.sheet import Entry, Line, Sheet
+from shiplog.manoeuvres.sheet import Sheet
 from shiplog.nomenclature.contract import CONTRACT
 from shiplog.nomenclature.numbers import counted, figure
 from shiplog.report.evaluation.text_table import table
@@ -160,6 +161,8 @@ def _quantities(entries: Sequence[Entry], runs: Sequence[str | None]) -> str:
     columns = [("measured", "measured")] if any(e.voyage is not None for e in entries) else []
     columns += [("simulated", "simulated")] if runs[0] else []
     columns += [("extended", "extended")] if runs[1] else []
+    full = any(line.full_load is not None for e in entries for line in e.lines)
+    columns += [("full load", "full_load")] if full else []
     rows = [
         (_short(e), line.kind.words, line.kind.unit,
          *(value(getattr(line, key)) for _, key in columns), limit(line))
@@ -182,7 +185,9 @@ def columns_of(entry: Entry, runs: Sequence[str | None]) -> list[tuple[str, str]
     """Title and field of what there is."""
     found = [("measured", "measured")] if entry.voyage is not None else []
     found += [("simulated", "simulated")] if runs[0] else []
-    return found + ([("extended", "extended")] if runs[1] else [])
+    found += [("extended", "extended")] if runs[1] else []
+    full = any(line.full_load is not None for line in entry.lines)
+    return found + ([("full load", "full_load")] if full else [])
 
 
 def value(estimate: Estimate | None) -> str:
