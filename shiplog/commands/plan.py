@@ -70,8 +70,9 @@ def plan_run(
         found = plan.plan(physical, sailor, within, water=water, seed=seed, instrument=instrument)
         sailed = {"The plan": found.found.sailed, found.zigzag[0]: found.zigzag[1]}
     else:
+        time = limits.usual_time(sailor) if seconds is None else seconds
         for name, of in STANDARD.items():
-            sailed[name] = sailor.sail(of, members=1, seconds=seconds, water=water)[0]
+            sailed[name] = sailor.sail(of, members=1, seconds=time, water=water)[0]
     reach("causes")
     apart, notes = _apart(run, store, sailed) if with_causes else ({}, ())
     done = Planned(run.name, run.profile, found, apart, out or run.path / "plan", notes)

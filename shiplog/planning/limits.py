@@ -51,6 +51,11 @@ class Limits:
         return np.where(known, out, 1e3)
 
 
+def usual_time(sailor: Sailor) -> float:
+    """s of a manoeuvre, unless a time is given."""
+    return MANOEUVRE_TIMES * sailor.length / max(sailor.speed, 1e-6)
+
+
 def limits(
     sailor: Sailor,
     *,
@@ -69,7 +74,7 @@ def limits(
     """
     profile, training = sailor.profile, sailor.training
     own = sailor.length / max(sailor.speed, 1e-6)
-    time = MANOEUVRE_TIMES * own if seconds is None else seconds
+    time = usual_time(sailor) if seconds is None else seconds
     if not LEAST_TIMES * own <= time <= MOST_TIMES * own:
         raise NoRoom(
             f"A manoeuvre of {time:g} s is {time / own:.2g} times L/U of {profile.ship.name}.",

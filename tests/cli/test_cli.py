@@ -100,7 +100,8 @@ def test_evaluate_answers_as_the_contract_says(run, store, tmp_path):
     content = json.loads(answer.read_text())
     assert set(content) == {"contract", "loss", "windows", "seeds", "rmse", "end_position_m",
                             "end_heading_deg", "floors", "voyages", "band_90", "winds",
-                            "sentence", "judgement", "too_short", "contradictions"}  # fmt: skip
+                            "sentence", "judgement", "too_short", "contradictions", "trust",
+                            "residual_tests"}  # fmt: skip
     assert content["loss"] == pytest.approx(np.mean(content["seeds"]))
     assert len(content["seeds"]) == 2 and content["windows"] == 3
     assert set(content["floors"]) == {"hold", "least_squares"}
@@ -186,7 +187,7 @@ def test_the_list_of_commands_has_whole_sentences():
     listed = listed.split("\n")[1:]
     assert all(f"{code} " in codes for code in (0, 1, 2, 3, 4))
     lines = [line for line in listed if line.strip()]
-    assert code == 0 and len(lines) == 16
+    assert code == 0 and len(lines) == 18
     assert all(line.endswith(".") and not line.endswith("...") for line in lines)
 
 
