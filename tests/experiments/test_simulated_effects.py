@@ -132,8 +132,8 @@ def test_a_shoal_adds_drag_and_mass_over_its_crest_and_nothing_far_away():
     elsewhere = sail(60.0, **kept, effects=replace(effects, shoal_east=2000.0))
     assert state(elsewhere) == pytest.approx(state(deep), abs=1e-5)
     # more water moves with it: the same force aside, from rest, gets it under way more slowly
-    out = np.empty((2, 11))
-    at_rest = np.zeros(11)
+    out = np.empty((2, physics.STATES))
+    at_rest = np.zeros(physics.STATES)
     at_rest[[0, 2]] = 5.0, -3.0
     force = np.array([2.0, 0.0, 0.0, 0.0])
     for row, hide in zip(out, (Effects(), effects), strict=True):

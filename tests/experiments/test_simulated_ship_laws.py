@@ -93,7 +93,7 @@ def test_each_term_grows_over_a_shoal_by_its_own_share_and_power():
 
     # and the masses: accelerated from rest at a place where (h₀/h)² = 1/4
     h = physics.hidden(Effects(shallow_water=0.8, shoal_length=1.0), (0.0, 1.0), 1.0)
-    at_rest, out = np.zeros(11), np.empty(11)
+    at_rest, out = np.zeros(physics.STATES), np.empty(physics.STATES)
     at_rest[2] = math.sqrt(3.0)
     force = np.array([2.0, 0.0, 0.0, 0.0])
     physics.rates(c, h, at_rest, 0.0, 0.0, 0.0, np.zeros(3), STILL, force, 0.0, out)
