@@ -53,11 +53,11 @@ PARAMETERS = {  # as the report prints them
     "rudder_delay": "`time` (s)",
     "actuator_limit": "`limit` (deg, rev/s or 1), `actuator` (a unit, or all of a kind)",
     "actuator_rate": "`rate` (deg/s, rev/s/s or 1/s), `actuator`",
-    "actuator_dead_band": "`width` (deg, rev/s or 1), `actuator`",
+    "actuator_dead_band": "`half_width` (deg, rev/s or 1), `actuator`",
     "actuator_stuck": "`value` (deg, rev/s or 1), `share` of the quarter of the campaign `part`, "
     "`actuator`",
-    "actuator_coupling": "`share` (of the other unit's order), `actuator` (`one<other`)",
-    "actuators_exchanged": "`share` (1: wholly), `actuator` (`one+other`)",
+    "actuator_coupling": "`share` (of the other unit's order), `actuator`, `of` (the other unit)",
+    "actuators_exchanged": "`share` (1: wholly), `actuator`, `other`",
     "heading_offset": "`angle` (deg, measured minus true)",
     "yaw_rate_bias": "`value` (deg/s, measured minus true)",
     "yaw_rate_scale": "`value` (measured over true)",
@@ -83,7 +83,7 @@ WITHOUT_PARAMETERS = {  # numbers that are made for each ship: realistic and pra
     ),
     "actuator_limit": (f"a third {REACH}", f"0.95 {REACH}"),
     "actuator_rate": ("10 √(length/g) from zero to the largest order", "0.5 √(length/g)"),
-    "actuator_dead_band": (f"0.15 {REACH}", f"0.02 {REACH}"),
+    "actuator_dead_band": (f"0.075 {REACH}", f"0.01 {REACH}"),
     "actuator_stuck": ("all of the order", "0.2 of a quarter"),
 }
 NEEDED = {

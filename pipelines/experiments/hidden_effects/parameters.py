@@ -69,9 +69,14 @@ class Comparison:
     standings: tuple[float, ...] = ()
 
 
+PLACES = {"x0": "north", "y0": "east"}
+
+
 def compare(name: str, truth: Values, reported: Values) -> Comparison:
     """The error is that of the vector: |reported - true| over |true - none|. What a key says in
     words, such as which unit has lost thrust, is no number and is left out."""
+    if name == "line":  # the program's axes are x0 and y0
+        reported = {PLACES.get(parameter, parameter): v for parameter, v in reported.items()}
     unit = name in ("thrust_loss", *ACTUATORS)
     apart = unit and elsewhere(name, truth, (reported,))
     truth = {p: v for p, v in truth.items() if p == "channel" or _is_number(v["value"])}

@@ -223,7 +223,7 @@ class ActuatorDeadBand(_OnUnits):
 
     name = "actuator_dead_band"
     story = "An actuator has a dead band."
-    equation = "u = band(u_recorded), {width:.3g} wide"
+    equation = "u = band(u_recorded), ±{half_width:.3g} wide"
     remedy = (
         "Move the order of this unit slowly through zero, and see when it follows: worn joints, or "
         "the dead zone of its drive. Set that zone in the profile where it is its drive's."
@@ -255,11 +255,11 @@ class ActuatorDeadBand(_OnUnits):
         return np.asarray(p[..., 0] > self.least * self.reach(setting))
 
     def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
-        return {"width": self.spoken(p[..., 0])}
+        return {"half_width": self.spoken(0.5 * p[..., 0])}
 
     def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
         what = "play" if self._turns else "a dead zone about zero"
-        return self.does("have", f"{what} of {_worded(estimates['width'])}")
+        return self.does("have", f"{what} of ±{_worded(estimates['half_width'])}")
 
 
 @dataclass(frozen=True)
@@ -322,13 +322,18 @@ class ActuatorStuck(_OnUnits):
 
 @dataclass(frozen=True)
 class _OnPairs(_OnUnits):
-    """Of two units of one kind, whose orders differ.
+    """Of two units of one kind, whose orders differ: `actuator` and the second of `units`."""
 
-    other   the profile's name of the second one
-    """
-
-    other: str = ""
     still = "no two actuators of a kind have orders that differ"
+
+    @property
+    def second(self) -> str:
+        """The profile's name of the other one."""
+        return self.units[1] if self.units else ""
+
+    @property
+    def label(self) -> str:
+        return f"{self.name}:{self._joint.join(self.units)}" if self.units else self.name
 
     @property
     def renames(self) -> bool:
@@ -347,8 +352,7 @@ class _OnPairs(_OnUnits):
                     apart = setting.apart(i, j) > ALIKE * max(setting.extent(i), setting.extent(j))
                     if self._pair(i, j) and apart and one.si_unit == two.si_unit:
                         pair = replace(
-                            self, actuator=f"{one.name}{self._joint}{two.name}",
-                            units=(one.name, two.name), unit=one.si_unit, other=two.name,
+                            self, actuator=one.name, units=(one.name, two.name), unit=one.si_unit,
                         )  # fmt: skip
                         found.append(pair)
         return tuple(found)
@@ -378,6 +382,11 @@ class ActuatorCoupling(_OnPairs):
     _joint = "<"
 
     @property
+    def of(self) -> str:
+        """The unit that it follows."""
+        return self.second
+
+    @property
     def count(self) -> int:
         return 2
 
@@ -396,7 +405,7 @@ class ActuatorCoupling(_OnPairs):
 
     def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
         share = estimates["share"].value
-        return self.does("follow", f"{share:.0%} of the order of {self.other}")
+        return self.does("follow", f"{share:.0%} of the order of {self.second}")
 
 
 @dataclass(frozen=True)
@@ -412,13 +421,17 @@ class ActuatorsExchanged(_OnPairs):
     parameters = (Parameter("share", "1", 1.0, 0.5, low=-0.5, high=1.5),)
     separated_by = {"actuator_coupling": "one unit at a time, the other at zero"}
 
+    @property
+    def other(self) -> str:
+        """The unit that it is exchanged with."""
+        return self.second
+
     def read(self, record: Record, p: np.ndarray) -> Record:
         share = float(p[0])
         return _mixed(record, self.units, ((share, share), (share, share)))
 
     def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
-        one = self.units[0] if self.units else ""
-        return f"The actuators {one} and {self.other} are exchanged."
+        return f"The actuators {self.actuator} and {self.second} are exchanged."
 
 
 def _mixed(

@@ -13,7 +13,8 @@ from shiplog.exceptions import listed
 from shiplog.nomenclature.numbers import NINETY_SPREADS, figure
 from shiplog.report.evaluation.text_table import table
 
-WHICH = ("channel", "actuator")  # the part of a cause's label after the colon
+# Of what it is: the part of a cause's label after the colon, by one or two words
+WHICH = ("channel", "actuator", "of", "other")
 SIDE_REMEDY = (
     "Find out what pushed at these times. If it is a thruster of the ship, record its order or its "
     "revolutions, and add it to the profile."
