@@ -64,7 +64,8 @@ class _Log:
         rows = self.ulog.topics.get((name, instance))
         if rows is None:
             return None
-        rows = rows[(rows["timestamp"] > 0) & (rows["timestamp"] >= self.ulog.start_us)]
+        own = (rows["timestamp"] > 0) & (rows["timestamp"] >= self.ulog.start_us)
+        rows = rows if own.all() else rows[own]
         return rows if len(rows) else None
 
     def instances(self, name: str) -> list[int]:

@@ -21,7 +21,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 MAGIC = b"ULog\x01\x12\x35"
 HEADER_BYTES, HEAD_BYTES, FLAG_BYTES, NUMBER_BYTES = 16, 3, 40, 2
 SAMPLE, FLAGS = ord("D"), ord("B")
-BLOCK_BYTES = 4 << 20  # read at once
+BLOCK_BYTES = 1 << 20  # read at once
 SYNC = b"\x08\x00S\x2f\x73\x13\x20\x25\x0c\xbb\x12"  # a whole message, to begin again at
 TYPES = {
     "int8_t": "<i1", "uint8_t": "<u1", "int16_t": "<i2", "uint16_t": "<u2", "int32_t": "<i4",
@@ -117,32 +117,28 @@ class _Reader:
     def _samples(self, at: int, final: bool) -> int:
         """Samples from `at` on, and what stands between them; where they stopped."""
         block = self.raw[at:]
-        heads = np.flatnonzero(block[2:-2] == SAMPLE)
         if len(block) < HEAD_BYTES + NUMBER_BYTES:
             return at
+        heads = np.flatnonzero(block[2:-2] == SAMPLE)
         two = sliding_window_view(block, 2)
-        heads = heads[heads + 4 < len(block)]
         sizes = two[heads].view("<u2").reshape(-1).astype(np.int64)
-        numbers = two[heads + HEAD_BYTES].view("<u2").reshape(-1).astype(np.int64)
+        numbers = two[heads + HEAD_BYTES].view("<u2").reshape(-1)
         known = (sizes == self.least[numbers]) | (sizes == self.padded[numbers])
         heads, sizes, numbers = heads[known], sizes[known], numbers[known]
         after = heads + HEAD_BYTES + sizes
-        nearest = np.searchsorted(heads, after)
-        leads = np.append(heads, -1)[nearest] == after  # to another sample
-        gaps = np.flatnonzero(~leads | (nearest != np.arange(len(heads)) + 1))
+        gaps = np.flatnonzero(np.append(after[:-1] != heads[1:], True))  # no sample follows at once
         keep = np.zeros(len(heads), bool)
         pos, k = 0, 0
         while k < len(heads) and heads[k] == pos:
             until = int(gaps[np.searchsorted(gaps, k)])
             keep[k : until + 1] = True
-            pos, k = int(after[until]), int(nearest[until])
+            pos = int(after[until])
+            k = int(np.searchsorted(heads, pos))
             if pos > len(block):  # goes on in the next block, or is cut off
                 keep[until], pos = False, int(heads[until])
                 break
             others = len(self.named)
-            while not leads[until] and pos + HEAD_BYTES < len(block) and (
-                k >= len(heads) or heads[k] != pos
-            ):  # fmt: skip
+            while pos + HEAD_BYTES < len(block) and (k >= len(heads) or heads[k] != pos):
                 following = self._one(at + pos, final) - at
                 if following == pos or len(self.named) != others:
                     pos, k = following, len(heads)  # look for samples anew from there
