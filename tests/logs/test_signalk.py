@@ -177,7 +177,9 @@ def test_a_line_that_is_cut_is_damaged_and_nothing_else_is_lost(tmp_path):
 
 def test_a_log_without_the_ship_says_what_it_has(tmp_path):
     n2k = f"1717236000000;A;{iso(0)},2,127250,2,255,8,00,f7,04,ff,7f,ff,ff,ff"
-    with pytest.raises(ChannelMissing, match=r"1 lines of NMEA 2000 are not read, .* 127250 heading"):
+    with pytest.raises(
+        ChannelMissing, match=r"1 lines of NMEA 2000 are not read, .* 127250 heading"
+    ):
         read(tmp_path, [n2k, f"1717236000000;I;{delta(0, {'tanks.fuel.0.level': 0.5})}"])
 
 
