@@ -40,8 +40,8 @@ field = "heading_deg"
 unit = "deg"
 """
 
-# CyberShip Enterprise I: what `cybership` found of its rows. The places are
-# estimates, which do not come with the data; the two propellers are abaft midship, the bow thruster ahead of it.
+# CyberShip Enterprise I: what `cybership` found of its rows. The places are estimates, which do not
+# come with the data; the two propellers are abaft midship, the bow thruster ahead of it.
 CSE_PLACES = {  # actuator: row, ahead and to starboard of midship [m], direction [deg]
     "port_ahead": (8, -0.46, -0.055, 0.0), "port_athwart": (9, -0.46, -0.055, 90.0),
     "starboard_ahead": (10, -0.46, 0.055, 0.0), "starboard_athwart": (11, -0.46, 0.055, 90.0),
