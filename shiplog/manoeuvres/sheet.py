@@ -133,6 +133,12 @@ def _notes(scale: float, sailors: Sequence[Sailor | None], deep: Loaded | None) 
                 f"{sailor.run.name} was extended by {listed(sailor.ignored)}, which is about "
                 "what is recorded: it does not change how the ship sails."
             )
+        if sailor is not None and sailor.fitted_band:
+            notes.append(
+                f"{sailor.run.name} has no voyages that were held out: its discrepancy is that of "
+                "those that it was fitted to, and its intervals are narrower than its errors on "
+                "others."
+            )
         if sailor is not None and not sailor.spreads:
             notes.append(
                 f"{sailor.run.name} has neither an uncertainty of its numbers nor held-out "
