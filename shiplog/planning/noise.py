@@ -59,14 +59,17 @@ def of_run(run: Run) -> Noise:
 
 
 def usual_wind(run: Run) -> tuple[float, float]:
-    """Mean true wind of the training voyages, where it comes from along x₀ and y₀, m/s: what a
-    manoeuvre is planned in, unless another wind is expected."""
+    """The training voyages' wind, where it comes from along x₀ and y₀, m/s: of their mean direction
+    and mean speed, since winds from all sides cancel in a mean vector. A manoeuvre is planned in
+    it, unless another wind is expected."""
     if not run.profile.has_wind:
         return 0.0, 0.0
     rows = run.training()
     state = rows.select(c.name for c in STATE).to_numpy()
-    north, east = true_wind(state, rows.select(run.profile.wind_names).to_numpy()).mean(0)
-    return float(north), float(east)
+    blowing = true_wind(state, rows.select(run.profile.wind_names).to_numpy())
+    north, east = blowing.mean(0)
+    size = float(np.hypot(*blowing.T).mean()) / max(float(np.hypot(north, east)), 1e-9)
+    return size * float(north), size * float(east)
 
 
 def _variances(parts: Sequence[np.ndarray]) -> tuple[float, float]:
