@@ -76,8 +76,9 @@ def plan(
 ) -> None:
     """The manoeuvre to sail next, and what it would show.
 
-    The one that says most about a run's coefficients: optimised within limits of water, rudder, speed and time, compared with the standard zigzag.
-    With the run's training voyages in the store, also which causes it would tell apart.
+    It says most about a run's coefficients, within limits of water, rudder, speed and time, and is
+    compared with the standard zigzag. With the run's training voyages in the store, also which
+    causes it would tell apart.
 
     Example: shiplog plan runs/mmg --water 600,300 --rudder 25
     """
