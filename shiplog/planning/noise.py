@@ -19,6 +19,7 @@ import numpy as np
 import polars as pl
 
 from shiplog.nomenclature.channels import STATE, VELOCITY_IN_STATE
+from shiplog.simulation.residual_tests import MOST_ROWS
 from shiplog.simulation.rollout import simulate
 from shiplog.simulation.window_series import true_wind
 from shiplog.training.runs.load_model import Run
@@ -42,7 +43,7 @@ class Noise:
 def of_run(run: Run) -> Noise:
     """By the residuals of its training rows; place and heading by the profile."""
     rows, profile = run.training(), run.profile
-    pairs = windows.plan(rows.lazy(), 2, 1).collect()
+    pairs = windows.plan(rows.lazy(), 2, 1).head(MOST_ROWS).collect()
     cut = windows.cut(rows, pairs, 2, profile.actuator_names, profile.wind_names)
     simulated = simulate(run.models()[run.config.seeds[0]], cut)
     errors = (cut.state - simulated)[:, 1, list(VELOCITY_IN_STATE)]
