@@ -74,10 +74,11 @@ def plan(
     ] = None,
     json_to: JsonOption = None,
 ) -> None:
-    """What to sail next: the manoeuvre that would say most about a run's coefficients.
+    """The manoeuvre to sail next, and what it would show.
 
-    Optimised within limits of water, rudder, speed and time, compared with the standard zigzag.
-    With the run's training voyages in the store, also which causes it would tell apart.
+    It says most about a run's coefficients, within limits of water, rudder, speed and time, and is
+    compared with the standard zigzag. With the run's training voyages in the store, also which
+    causes it would tell apart.
 
     Example: shiplog plan runs/mmg --water 600,300 --rudder 25
     """

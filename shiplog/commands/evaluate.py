@@ -29,7 +29,7 @@ from shiplog.report.viewer.comparison_data import (
 from shiplog.simulation import baselines, prediction_interval, scoring
 from shiplog.simulation import coverage as covering
 from shiplog.simulation.better_model import Better, better
-from shiplog.simulation.residual_tests import ResidualTest, residual_tests
+from shiplog.simulation.residual_tests import MOST_ROWS, ResidualTest, residual_tests
 from shiplog.simulation.rollout import simulate
 from shiplog.training.runs import load_model, trust_file
 from shiplog.training.runs.load_model import Run
@@ -238,7 +238,7 @@ def _inside(scored: list, bands: dict[str, np.ndarray | None], cut: Windows) -> 
 
 def _residual_tests(run: Run, rows: pl.DataFrame) -> tuple[ResidualTest, ...]:
     """Of what the first seed leaves over in one second, at every pair of neighbouring rows."""
-    pairs = windows.plan(rows.lazy(), 2, 1).collect()
+    pairs = windows.plan(rows.lazy(), 2, 1).head(MOST_ROWS).collect()
     if not pairs.height:
         return ()
     profile = run.profile

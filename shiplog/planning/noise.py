@@ -19,6 +19,7 @@ import numpy as np
 import polars as pl
 
 from shiplog.nomenclature.channels import STATE, VELOCITY_IN_STATE
+from shiplog.simulation.residual_tests import MOST_ROWS
 from shiplog.simulation.rollout import simulate
 from shiplog.simulation.window_series import true_wind
 from shiplog.training.runs.load_model import Run
@@ -42,7 +43,7 @@ class Noise:
 def of_run(run: Run) -> Noise:
     """By the residuals of its training rows; place and heading by the profile."""
     rows, profile = run.training(), run.profile
-    pairs = windows.plan(rows.lazy(), 2, 1).collect()
+    pairs = windows.plan(rows.lazy(), 2, 1).head(MOST_ROWS).collect()
     cut = windows.cut(rows, pairs, 2, profile.actuator_names, profile.wind_names)
     simulated = simulate(run.models()[run.config.seeds[0]], cut)
     errors = (cut.state - simulated)[:, 1, list(VELOCITY_IN_STATE)]
@@ -59,14 +60,17 @@ def of_run(run: Run) -> Noise:
 
 
 def usual_wind(run: Run) -> tuple[float, float]:
-    """Mean true wind of the training voyages, where it comes from along x₀ and y₀, m/s: what a
-    manoeuvre is planned in, unless another wind is expected."""
+    """The training voyages' wind, where it comes from along x₀ and y₀, m/s: of their mean direction
+    and mean speed, since winds from all sides cancel in a mean vector. A manoeuvre is planned in
+    it, unless another wind is expected."""
     if not run.profile.has_wind:
         return 0.0, 0.0
     rows = run.training()
     state = rows.select(c.name for c in STATE).to_numpy()
-    north, east = true_wind(state, rows.select(run.profile.wind_names).to_numpy()).mean(0)
-    return float(north), float(east)
+    blowing = true_wind(state, rows.select(run.profile.wind_names).to_numpy())
+    north, east = blowing.mean(0)
+    size = float(np.hypot(*blowing.T).mean()) / max(float(np.hypot(north, east)), 1e-9)
+    return size * float(north), size * float(east)
 
 
 def _variances(parts: Sequence[np.ndarray]) -> tuple[float, float]:

@@ -34,6 +34,7 @@ LEVEL = 0.05  # of all tests of one model together
 LAGS = 20  # s of the test of whiteness
 INPUT_LAGS = (0, 1, 2, 4, 8, 16)  # s by which an input precedes the residual
 MEMORY = 60  # s over which autocorrelations are summed, tapered to zero there (Bartlett 1946)
+MOST_ROWS = 40_000  # s, the first of them: eleven hours say it as surely, in bounded memory
 LEAST_ROWS = 200  # s: of fewer, a test of twenty lags says nothing
 MOST_NOISE = -0.99  # b: a sensor so noisy that its white noise is all that is seen
 SINGULAR = 1e-2  # of the largest eigenvalue of P: an input that hardly moves has fewer directions
