@@ -289,7 +289,8 @@ class _Units:
 
     def __init__(self, joined: dict[str, tuple[Layout, np.ndarray]]) -> None:
         self.of: dict[int, tuple[str, str]] = {}
-        if "FMTU" in joined:
+        described = {"FmtType", "UnitIds", "MultIds"}
+        if "FMTU" in joined and described <= set(joined["FMTU"][1].dtype.names or ()):
             rows = joined["FMTU"][1]
             for kind, units, mults in zip(
                 rows["FmtType"].tolist(), rows["UnitIds"].tolist(), rows["MultIds"].tolist(),
@@ -300,7 +301,7 @@ class _Units:
         self.factors = self._letters(joined, "MULT", "Mult")
 
     def _letters(self, joined: dict, name: str, label: str) -> dict:
-        if name not in joined:
+        if name not in joined or not {"Id", label} <= set(joined[name][1].dtype.names or ()):
             return {}
         rows = joined[name][1]
         values = rows[label].tolist()
