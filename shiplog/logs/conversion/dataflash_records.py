@@ -78,7 +78,8 @@ class Table:
         """Values [n] in the field's unit; NaN where there is no such field."""
         if not self.has(label):
             return np.full(len(self.rows), np.nan)
-        return self.rows[label].astype(np.float64) / self.divisor[label]
+        with np.errstate(invalid="ignore"):  # a float that signals NaN
+            return self.rows[label].astype(np.float64) / self.divisor[label]
 
     def text(self, label: str) -> list[str]:
         return [raw.decode("latin-1") for raw in self.rows[label].tolist()]
