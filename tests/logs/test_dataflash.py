@@ -433,6 +433,14 @@ def test_damage_in_the_middle_costs_its_records_only(tmp_path, trip):
     assert any("damaged" in what for what in read_dataflash(tmp_path / "hole.BIN").lost)
 
 
+def test_a_damaged_format_of_units_costs_the_units(tmp_path):
+    """A record's name for its field is one letter off."""
+    raw = circle().replace(b"TimeUS,Id,Label", b"TimeUS,Id,Labxl", 1)
+    (tmp_path / "units.BIN").write_bytes(raw)
+    found = {one.topic: one for one in read_dataflash(tmp_path / "units.BIN").series}
+    assert len(found["/gyro"].time) == 601
+
+
 def test_a_card_filled_up_with_nothing_is_whole(tmp_path, trip):
     for filler in (b"\0", b"\xff"):
         (tmp_path / "filled.BIN").write_bytes(trip.read_bytes() + filler * 5000)

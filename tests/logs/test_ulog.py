@@ -179,6 +179,14 @@ def test_two_subscriptions_of_one_instance_are_joined_and_instances_stay_apart(t
     assert {key: len(rows) for key, rows in found.topics.items()} == {(name, 0): 3, (name, 1): 1}
 
 
+def test_a_topic_without_a_field_that_is_read_costs_itself(tmp_path):
+    """An estimate of another version, that does not say whether its velocity is valid."""
+    fields = ulog.FORMATS["vehicle_local_position"].replace("v_xy_valid", "v_xy_ok")
+    rows = [(0, ulog.BOOT_US + k, 0, 1.0, 2.0, 3.0, 4.0, 1, 1) for k in range(3)]
+    found = topics(one_topic("vehicle_local_position", rows, fields), tmp_path)
+    assert list(found) == ["/ekf/local_position"]
+
+
 def test_receivers_stay_apart(tmp_path):
     """sensor_gps has an instance each, where vehicle_gps_position is not there."""
     fields = ulog.FORMATS["vehicle_gps_position"]

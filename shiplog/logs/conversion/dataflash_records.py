@@ -78,7 +78,8 @@ class Table:
         """Values [n] in the field's unit; NaN where there is no such field."""
         if not self.has(label):
             return np.full(len(self.rows), np.nan)
-        return self.rows[label].astype(np.float64) / self.divisor[label]
+        with np.errstate(invalid="ignore"):  # a float that signals NaN
+            return self.rows[label].astype(np.float64) / self.divisor[label]
 
     def text(self, label: str) -> list[str]:
         return [raw.decode("latin-1") for raw in self.rows[label].tolist()]
@@ -289,7 +290,8 @@ class _Units:
 
     def __init__(self, joined: dict[str, tuple[Layout, np.ndarray]]) -> None:
         self.of: dict[int, tuple[str, str]] = {}
-        if "FMTU" in joined:
+        described = {"FmtType", "UnitIds", "MultIds"}
+        if "FMTU" in joined and described <= set(joined["FMTU"][1].dtype.names or ()):
             rows = joined["FMTU"][1]
             for kind, units, mults in zip(
                 rows["FmtType"].tolist(), rows["UnitIds"].tolist(), rows["MultIds"].tolist(),
@@ -300,7 +302,7 @@ class _Units:
         self.factors = self._letters(joined, "MULT", "Mult")
 
     def _letters(self, joined: dict, name: str, label: str) -> dict:
-        if name not in joined:
+        if name not in joined or not {"Id", label} <= set(joined[name][1].dtype.names or ()):
             return {}
         rows = joined[name][1]
         values = rows[label].tolist()

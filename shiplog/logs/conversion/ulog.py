@@ -59,10 +59,10 @@ class _Log:
     clock: BootClock
     old: int = 0
 
-    def rows(self, name: str, instance: int = 0) -> np.ndarray | None:
-        """The samples of a topic; None where there is none."""
+    def rows(self, name: str, *labels: str, instance: int = 0) -> np.ndarray | None:
+        """The samples of a topic; None where there is none, or without one of these fields."""
         rows = self.ulog.topics.get((name, instance))
-        if rows is None:
+        if rows is None or not set(labels) <= set(rows.dtype.names or ()):
             return None
         own = (rows["timestamp"] > 0) & (rows["timestamp"] >= self.ulog.start_us)
         rows = rows if own.all() else rows[own]
@@ -89,7 +89,8 @@ def read_ulog(path: Path) -> Recording:
     ulog = read_messages(path, WANTED)
     log = _Log(ulog, BootClock(None))
     log.clock = _clock(log)
-    series = [*_receivers(log), *_attitude(log), *_estimate(log), *_driven(log)]
+    with np.errstate(invalid="ignore"):  # a float that signals NaN
+        series = [*_receivers(log), *_attitude(log), *_estimate(log), *_driven(log)]
     if not series:
         raise ChannelMissing(
             f"{path.name} holds no sample of a vehicle's motion in "
@@ -147,12 +148,12 @@ def _clock(log: _Log) -> BootClock:
 def _receivers(log: _Log) -> list[Series]:
     """The receiver in use, and each by itself where there are several."""
     series = []
-    used = log.rows(RECEIVERS[0])
+    used = log.rows(RECEIVERS[0], "fix_type")
     own = log.instances(RECEIVERS[1])
     if used is not None:
         series += _receiver(log, used, "", True)
     for number in own if used is None or len(own) > 1 else ():
-        rows = log.rows(RECEIVERS[1], number)
+        rows = log.rows(RECEIVERS[1], "fix_type", instance=number)
         if rows is not None:
             plain = used is None and number == own[0]
             series += _receiver(log, rows, "" if plain else f"/gps_{number + 1}", plain)
@@ -167,9 +168,9 @@ def _receiver(log: _Log, rows: np.ndarray, end: str, primary: bool) -> list[Seri
     def known(label: str, divisor: float = 1.0) -> np.ndarray:
         return np.where(valid, rows[label].astype(float) / divisor, np.nan)
 
-    if "latitude_deg" in names:
+    if {"latitude_deg", "longitude_deg"} <= set(names):
         place = {"latitude": known("latitude_deg"), "longitude": known("longitude_deg")}
-    elif "lat" in names:
+    elif {"lat", "lon"} <= set(names):
         place = {"latitude": known("lat", E7), "longitude": known("lon", E7)}
     else:
         return []
@@ -215,7 +216,7 @@ def _antenna(log: _Log) -> dict[str, str]:
 def _attitude(log: _Log) -> list[Series]:
     """Heading of the quaternion (w first, ship to north-east-down), turn of the gyro."""
     series = []
-    rows = log.rows("vehicle_attitude")
+    rows = log.rows("vehicle_attitude", "q")
     if rows is not None:
         w, x, y, z = rows["q"].astype(float).T
         heading = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)) * DEG % 360.0
@@ -223,7 +224,7 @@ def _attitude(log: _Log) -> list[Series]:
         columns = {"heading_deg": heading}
         series.append(Series("/gyro", "shiplog.Gyro", log.time(rows), columns, metadata=said))
     for name, label in RATES.items():
-        rows = log.rows(name)
+        rows = log.rows(name, label)
         if rows is not None:
             columns = {"yaw_rate_degps": rows[label][:, 2].astype(float) * DEG}
             said = {"sensor": name, "primary": "1"}
@@ -237,26 +238,23 @@ def _attitude(log: _Log) -> list[Series]:
 def _estimate(log: _Log) -> list[Series]:
     """What the autopilot estimated; blank while it says that it is not valid."""
     series = []
-    rows = log.rows("vehicle_global_position")
+    rows = log.rows("vehicle_global_position", "lat", "lon")
     if rows is not None:
         place = {"latitude": rows["lat"].astype(float), "longitude": rows["lon"].astype(float)}
         series.append(Series("/ekf/position", "foxglove.LocationFix", log.time(rows), place))
-    rows = log.rows("vehicle_local_position")
-    if rows is not None:
-        time = log.time(rows)
-        for topic, schema, labels, flag in (
-            ("/ekf/local_position", "shiplog.LocalPosition", {"x0_m": "x", "y0_m": "y"},
-             "xy_valid"),
-            ("/ekf/velocity", "shiplog.EarthVelocity", {"north_mps": "vx", "east_mps": "vy"},
-             "v_xy_valid"),
-        ):  # fmt: skip
-            valid = rows[flag] != 0  # bool or int8
-            if valid.any():
-                columns = {
-                    name: np.where(valid, rows[label].astype(float), np.nan)
-                    for name, label in labels.items()
-                }
-                series.append(Series(topic, schema, time, columns))
+    for topic, schema, labels, flag in (
+        ("/ekf/local_position", "shiplog.LocalPosition", {"x0_m": "x", "y0_m": "y"}, "xy_valid"),
+        ("/ekf/velocity", "shiplog.EarthVelocity", {"north_mps": "vx", "east_mps": "vy"},
+         "v_xy_valid"),
+    ):  # fmt: skip
+        rows = log.rows("vehicle_local_position", *labels.values(), flag)
+        valid = np.zeros(0, bool) if rows is None else rows[flag] != 0  # bool or int8
+        if rows is not None and valid.any():
+            columns = {
+                name: np.where(valid, rows[label].astype(float), np.nan)
+                for name, label in labels.items()
+            }
+            series.append(Series(topic, schema, log.time(rows), columns))
     return series
 
 
@@ -272,7 +270,7 @@ def _driven(log: _Log) -> list[Series]:
     if series:
         return series
     for number in log.instances("actuator_outputs"):
-        rows = log.rows("actuator_outputs", number)
+        rows = log.rows("actuator_outputs", "output", instance=number)
         if rows is None:
             continue
         values = rows["output"].astype(float)
@@ -288,7 +286,7 @@ def _controls(
     log: _Log, name: str, said: Callable[[int], dict[str, str]], topic: str
 ) -> list[Series]:
     """The controls that are used: those of others are NaN, of rovers and boats 0 throughout."""
-    rows = log.rows(name)
+    rows = log.rows(name, "control")
     if rows is None:
         return []
     values = rows["control"].astype(float)
