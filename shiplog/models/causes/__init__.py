@@ -5,12 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from shiplog.models.causes.actuator_pairs import ActuatorCoupling, ActuatorsExchanged
 from shiplog.models.causes.actuators import (
-    ActuatorCoupling,
     ActuatorDeadBand,
     ActuatorLimit,
     ActuatorRate,
-    ActuatorsExchanged,
     ActuatorStuck,
 )
 from shiplog.models.causes.base import (

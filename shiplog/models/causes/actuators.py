@@ -1,7 +1,7 @@
 """Causes in an actuator: it does not do what was recorded of it. One number of its model each.
 
-`actuator_response` has the model and its equations. Each cause is tested of every unit by itself,
-and of all units of a kind together. What is tested is an order that moved: of a unit that stood
+`actuator_response` has the model and its equations, `actuator_pairs` the causes of two units. Each
+cause is tested of every unit by itself, and of all units of a kind together. What is tested is an order that moved: of a unit that stood
 still nothing is known.
 """
 
@@ -15,7 +15,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from shiplog.models.causes import actuator_response as response
-from shiplog.models.causes.base import Cause, Parameter, ParameterEstimate, Setting
+from shiplog.models.causes.base import Cause, ParameterEstimate, Setting
 from shiplog.models.mmg.estimate import GRAVITY
 from shiplog.nomenclature.numbers import figure
 from shiplog.voyages.rows.recording import Record
@@ -27,12 +27,11 @@ SPOKEN = {"rad": ("deg", np.radians(1.0)), "rev/s": ("rev/s", 1.0), "1": ("1", 1
 # even, a rate is not one from end to end.
 SHARPNESS = 0.1
 STILL = 1e-9  # of an order's unit: it has not moved
-ALIKE = 0.02  # share of the extent by which two orders have to differ, to be told from each other
 STRETCHES = 4  # of a campaign, in which a unit may be stuck
 
 
 @dataclass(frozen=True)
-class _OnUnits(Cause):
+class OnUnits(Cause):
     """Of these units of one kind.
 
     actuator   the unit's name, or the kind's in the plural
@@ -122,7 +121,7 @@ class _OnUnits(Cause):
 
 
 @dataclass(frozen=True)
-class ActuatorLimit(_OnUnits):
+class ActuatorLimit(OnUnits):
     """It turns, or pushes, no farther: L = 1/q.
 
     Size: a third of what was ordered is left. No figure is published: it is a rudder of 35 deg that
@@ -166,11 +165,11 @@ class ActuatorLimit(_OnUnits):
 
     def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
         limit = estimates["limit"]
-        return self.does("go", f"no farther than {_worded(limit)}, whatever is recorded")
+        return self.does("go", f"no farther than {worded(limit)}, whatever is recorded")
 
 
 @dataclass(frozen=True)
-class ActuatorRate(_OnUnits):
+class ActuatorRate(OnUnits):
     """It moves slower than recorded: R = 1/q.
 
     Size: twice as slow as a steering machine may be, 28 s for 65 deg (SOLAS II-1/29.3): 30 s from
@@ -211,11 +210,11 @@ class ActuatorRate(_OnUnits):
         return {"rate": self.spoken(1.0 / np.maximum(p[..., 0], 1e-6), "/s")}
 
     def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
-        return self.does("move", f"no faster than {_worded(estimates['rate'])}")
+        return self.does("move", f"no faster than {worded(estimates['rate'])}")
 
 
 @dataclass(frozen=True)
-class ActuatorDeadBand(_OnUnits):
+class ActuatorDeadBand(OnUnits):
     """Backlash of what turns (play), dead zone of what pushes: nothing acts near zero.
 
     Size: a tenth of what is ordered. The pulse width of a small electric thruster has a zone of
@@ -259,11 +258,11 @@ class ActuatorDeadBand(_OnUnits):
 
     def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
         what = "play" if self._turns else "a dead zone about zero"
-        return self.does("have", f"{what} of ±{_worded(estimates['half_width'])}")
+        return self.does("have", f"{what} of ±{worded(estimates['half_width'])}")
 
 
 @dataclass(frozen=True)
-class ActuatorStuck(_OnUnits):
+class ActuatorStuck(OnUnits):
     """It stays at one value for a stretch: in each quarter of the campaign a share h of its order
     is lost, and h times the value c acts instead.
 
@@ -315,139 +314,11 @@ class ActuatorStuck(_OnUnits):
         part = round(estimates["part"].value)
         share = min(max(estimates["share"].value, 0.0), 1.0)
         return self.does(
-            "are", f"stuck at {_worded(estimates['value'])} for {share:.0%} of quarter {part} of "
+            "are", f"stuck at {worded(estimates['value'])} for {share:.0%} of quarter {part} of "
             "the campaign",
         )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class _OnPairs(_OnUnits):
-    """Of two units of one kind, whose orders differ: `actuator` and the second of `units`."""
-
-    still = "no two actuators of a kind have orders that differ"
-
-    @property
-    def second(self) -> str:
-        """The profile's name of the other one."""
-        return self.units[1] if self.units else ""
-
-    @property
-    def label(self) -> str:
-        return f"{self.name}:{self._joint.join(self.units)}" if self.units else self.name
-
-    @property
-    def renames(self) -> bool:
-        return True
-
-    def compatible(self, label: str) -> bool:
-        return label.partition(":")[0] != self.name
-
-    def each(self, setting: Setting) -> tuple[Cause, ...]:
-        found = []
-        for kind in self.kinds:
-            columns = setting.columns(kind)
-            for i in columns:
-                for j in columns:
-                    one, two = (setting.profile.actuators[k] for k in (i, j))
-                    apart = setting.apart(i, j) > ALIKE * max(setting.extent(i), setting.extent(j))
-                    if self._pair(i, j) and apart and one.si_unit == two.si_unit:
-                        pair = replace(
-                            self, actuator=one.name, units=(one.name, two.name), unit=one.si_unit,
-                        )  # fmt: skip
-                        found.append(pair)
-        return tuple(found)
-
-    _joint: ClassVar[str] = "+"
-
-    def _pair(self, i: int, j: int) -> bool:
-        return i < j
-
-
-@dataclass(frozen=True)
-class ActuatorCoupling(_OnPairs):
-    """It follows a share q of the order of another unit; of its own order a part of q is lost,
-    between none (both orders add) and all (one takes the other's place), ½ + g of it.
-
-    Size: a third. No figure is published; it is what a crossed wire or a shared shaft leaves."""
-
-    name = "actuator_coupling"
-    story = "An actuator follows a share of another one's order."
-    equation = "u₁ = u₁,recorded + {share:.2f} (u₂,recorded - (½ + g) u₁,recorded)"
-    remedy = (
-        "Move the other unit alone, and see whether this one follows: mixed signals, an allocation "
-        "that the recorder does not know, a linkage."
-    )
-    parameters = (Parameter("share", "1", 0.35, 0.03, low=-1.5, high=1.5),)
-    separated_by = {"thrust_loss": "one unit at a time, the other at zero"}
-    _joint = "<"
-
-    @property
-    def of(self) -> str:
-        """The unit that it follows."""
-        return self.second
-
-    @property
-    def count(self) -> int:
-        return 2
-
-    def sizes(self, setting: Setting) -> np.ndarray:
-        return np.array([self.parameters[0].prior, 0.5])
-
-    def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
-        one = self.parameters[0]
-        return np.array([one.low, -1.0]), np.array([one.high, 1.0])
-
-    def _pair(self, i: int, j: int) -> bool:
-        return i != j
-
-    def read(self, record: Record, p: np.ndarray) -> Record:
-        return _mixed(record, self.units, ((float(p[0]), float(p[0] * (0.5 + p[1]))), (0.0, 0.0)))
-
-    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
-        share = estimates["share"].value
-        return self.does("follow", f"{share:.0%} of the order of {self.second}")
-
-
-@dataclass(frozen=True)
-class ActuatorsExchanged(_OnPairs):
-    """Each of two units does what is recorded of the other one: q = 1; between, a share of it.
-
-    Size: all of it."""
-
-    name = "actuators_exchanged"
-    story = "Two actuators are exchanged."
-    equation = "u₁ = u₂,recorded,  u₂ = u₁,recorded"
-    remedy = "Exchange their two names in the profile, and ingest these logs again."
-    parameters = (Parameter("share", "1", 1.0, 0.5, low=-0.5, high=1.5),)
-    separated_by = {"actuator_coupling": "one unit at a time, the other at zero"}
-
-    @property
-    def other(self) -> str:
-        """The unit that it is exchanged with."""
-        return self.second
-
-    def read(self, record: Record, p: np.ndarray) -> Record:
-        share = float(p[0])
-        return _mixed(record, self.units, ((share, share), (share, share)))
-
-    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
-        return f"The actuators {self.actuator} and {self.second} are exchanged."
-
-
-def _mixed(
-    record: Record, units: Sequence[str], shares: tuple[tuple[float, float], tuple[float, float]]
-) -> Record:
-    """Each of two units with a share of the other one's order, and less by a share of its own."""
-    names = record.profile.actuator_names
-    if not units or not any(map(any, shares)) or any(one not in names for one in units):
-        return record
-    i, j = (names.index(one) for one in units)
-    actuator = record.actuator.copy()
-    one, two = record.actuator[:, i], record.actuator[:, j]
-    actuator[:, i] = one + shares[0][0] * two - shares[0][1] * one
-    actuator[:, j] = two + shares[1][0] * one - shares[1][1] * two
-    return replace(record, actuator=actuator)
-
-
-def _worded(one: ParameterEstimate) -> str:
+def worded(one: ParameterEstimate) -> str:
+    """A value with its unit."""
     return f"{figure(one.value, 3)} {one.unit}" if one.unit != "1" else figure(one.value, 3)
