@@ -1,8 +1,8 @@
 """Causes in an actuator: it does not do what was recorded of it. One number of its model each.
 
 `actuator_response` has the model and its equations, `actuator_pairs` the causes of two units. Each
-cause is tested of every unit by itself, and of all units of a kind together. What is tested is an order that moved: of a unit that stood
-still nothing is known.
+cause is tested of every unit by itself, and of all units of a kind together. What is tested is an
+order that moved: of a unit that stood still nothing is known.
 """
 
 from __future__ import annotations
