@@ -119,6 +119,7 @@ def test_the_diffs_are_six():
     ]  # fmt: skip
 
 
+@pytest.mark.long
 def test_what_they_add_works(tree, tmp_path):
     store = tmp_path / "store"
     for arguments in (

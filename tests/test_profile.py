@@ -224,7 +224,7 @@ def test_the_reference_has_every_key_kind_channel_and_unit():
         *profile_file.shipped(),
     ):
         assert f"`{word}`" in page
-    example = page[page.index("    [ship]") : page.index("Position, velocity and heading")]
+    example = page[page.index("    [ship]") : page.index("Position and heading are needed")]
     ship = profile_file.parse(textwrap.dedent(example), "docs/reference/profile.md")
     assert ship.sensors.position.lever_arm_m == (3.2, 0.0)
 

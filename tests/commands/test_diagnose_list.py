@@ -46,6 +46,7 @@ def rows_of(out) -> list[dict]:
     return answer(out / "verdicts.json")["ships"]
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 def test_a_ship_that_fails_or_is_killed_costs_its_own_row(ships, tmp_path, monkeypatch):
     monkeypatch.setattr(fleet, "_ship", killed_or_real)

@@ -15,6 +15,8 @@ from shiplog.simulation import schedules
 from shiplog.training.runs import load_model, sailing_run
 from shiplog.training.runs.load_model import NetworkRun
 
+pytestmark = pytest.mark.long
+
 WATER = (40.0, 30.0)  # m: as the pond of the simulated ship
 TIMES = ("--seconds", 140, "--water", "40,30", "--speed", "-0.5,0.6", "--rudder", 30)
 

@@ -16,6 +16,8 @@ from shiplog.diagnosis.trial.shared_trial import Remote, SharedTrial
 from shiplog.exceptions import ShiplogError
 from shiplog.training.network import cluster
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module", autouse=True)
 def a_voyage_a_block():

@@ -87,6 +87,7 @@ def test_columns_between_nodes_are_derivatives_of_what_was_simulated():
     assert found.z[..., 6 + GRID.nodes + 7] == pytest.approx(slope, abs=2e-5)
 
 
+@pytest.mark.long
 def test_a_ship_that_needs_no_finer_steps_keeps_its_numbers():
     """The paper's ship at the nodes' own step, bit by bit, with one and with two Euler steps."""
     profile = profiles.load("esso-vectwin")

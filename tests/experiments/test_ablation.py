@@ -136,6 +136,7 @@ def test_without_form_errors_no_cause_has_one(acts):
     coarse = [cause for cause in CATALOGUE if cause.form_error]
     assert {cause.name: cause.form_error for cause in coarse} == {
         "bank": 0.2, "shallow_water": 0.2, "contact": 0.2, "line": 0.1, "tow": 0.1,
+        **dict.fromkeys((c.name for c in coarse if c.name.startswith("actuator")), 0.1),
     }  # fmt: skip
     by, alone = {cause.label: cause for cause in coarse}, {"bank": 5000.0}
     scale = Scale(Priors(coarse, ()), {}, by, alone, 0.0, form_errors=acts)

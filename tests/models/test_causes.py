@@ -95,7 +95,8 @@ def test_zero_leaves_a_record_as_it_was(cause, profile):
 # --- words ----------------------------------------------------------------------------------------
 
 
-INVERSE = ("actuator_limit", "actuator_rate")  # their number is one over what is displayed
+# Their number is one over what is displayed, or twice that
+INVERSE = ("actuator_limit", "actuator_rate", "actuator_dead_band")
 
 
 @EVERY
