@@ -47,6 +47,7 @@ def test_it_predicts_held_out_voyages_and_its_bands_hold_them(trained):
     assert min(answer["band_90"].values()) > 0.75
 
 
+@pytest.mark.nightly
 def test_it_finds_what_the_second_season_hides(trained):
     """A current and a late GNSS, as `sample_logs/answers/key.json` has them."""
     folder, store, run = trained

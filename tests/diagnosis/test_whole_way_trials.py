@@ -46,7 +46,6 @@ def test_a_cause_of_the_users_own_is_named(sea, trials):
     assert decision.named[0].cause.user
 
 
-@pytest.mark.long
 def test_a_line_is_named_with_its_point_and_its_pull(sea, trials):
     """The simulated line pulls as hard at every distance, from midship: no spring, which the search
     begins with."""
@@ -63,7 +62,6 @@ def test_a_line_is_named_with_its_point_and_its_pull(sea, trials):
 # --- without any key: what must change with the data, and what must not
 
 
-@pytest.mark.long
 def test_turning_the_pond_turns_the_current(sea):
     _, decision = judged(sea.campaign, turned(sea.done.trial.record))
     assert labels(decision) == ["current"]
@@ -89,7 +87,6 @@ def test_taken_out_of_the_data_it_is_gone(sea, compass):
     assert (after.verdict, labels(after)) == ("none", [])
 
 
-@pytest.mark.long
 def test_more_noise_makes_no_surer(sea):
     """White noise as large as the instruments' own, on top of it: the same name, less evidence."""
     observed = sea.done.trial.record
@@ -104,7 +101,6 @@ def test_more_noise_makes_no_surer(sea):
     assert decision.named[0].probability <= sea.done.decision.named[0].probability + 1e-6
 
 
-@pytest.mark.long
 def test_half_the_data_has_the_same_name(sea):
     """One of the two voyages alone: less evidence, a wider interval."""
     whole = sea.done.decision.named[0]
@@ -171,7 +167,6 @@ def test_what_a_lag_would_change_is_after_a_step_and_not_before(sea):
 # --- traps that make simpler methods invent causes
 
 
-@pytest.mark.long
 def test_one_wild_segment_does_not_decide(sea):
     """A shove of 0.3 m/s for some seconds in one segment: it counts less, the others decide."""
     observed = sea.done.trial.record

@@ -23,7 +23,8 @@ from pipelines.experiments.other_families.lines import (
 )
 from pipelines.experiments.other_families.voyage import sail
 
-pytestmark = pytest.mark.long  # simulators of the experiments; the product has its own tests
+# simulators of the experiments, each compiled; the product has its own tests
+pytestmark = pytest.mark.nightly
 STILL = {"seed": 0, "wind": CALM, "quiet": True}
 
 

@@ -81,7 +81,10 @@ def hybrid_model():
     return model, np.concatenate((hybrid_ship.THETA, weights)), 2
 
 
-OF_THE_FERRY = [c for c in CATALOGUE if "rudder" not in c.label and "bank" not in c.label]
+# It has neither rudder nor, in its profile, a wall
+OF_THE_FERRY = [
+    c for c in CATALOGUE if "rudder" not in c.label and c.name not in ("bank", "contact")
+]
 MODELS = {
     **{name: lambda name=name: physics(name) for name in SHIPS},
     "two rudders, all causes": lambda: with_causes(TWIN, CATALOGUE),
@@ -224,7 +227,9 @@ def test_columns_of_segments_are_jaxs(name):
     alone, without, nothing = paths.columns(
         model, theta, start, acceleration, driven, hats, step, bins
     )
-    assert np.array_equal(alone, y) and without == pytest.approx(z, rel=1e-13, abs=1e-14)
+    # two compiled functions round differently in the last bit
+    assert alone == pytest.approx(y, rel=1e-14, abs=1e-15)
+    assert without == pytest.approx(z, rel=1e-13, abs=1e-14)
     assert nothing is None
 
 

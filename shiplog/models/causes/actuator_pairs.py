@@ -74,7 +74,7 @@ class ActuatorCoupling(_OnPairs):
     )
     parameters = (Parameter("share", "1", 0.35, 0.03, low=-1.5, high=1.5),)
     separated_by = {"thrust_loss": "one unit at a time, the other at zero"}
-    _joint = "<"
+    _joint = "/"
 
     @property
     def of(self) -> str:
