@@ -29,6 +29,7 @@ def store(tmp_path_factory):
     return folder / "store"
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGKILL"])
 def test_a_training_ends_with_its_command(store, tmp_path, name):

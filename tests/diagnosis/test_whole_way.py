@@ -28,6 +28,8 @@ from shiplog.exceptions import RunError
 from shiplog.voyages.contradictions import twins
 from shiplog.voyages.store.store import Store
 
+pytestmark = pytest.mark.long
+
 
 def test_a_current_is_named_and_sized(sea):
     (named,) = sea.done.decision.named

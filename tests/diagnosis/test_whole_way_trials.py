@@ -17,6 +17,8 @@ from shiplog.diagnosis.trial.trial import Trial
 from shiplog.diagnosis.verdict import result as decisions
 from shiplog.voyages.rows import timescale  # fmt: skip
 
+pytestmark = pytest.mark.long
+
 # --- what is hidden, and what is not
 
 

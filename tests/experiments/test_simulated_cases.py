@@ -48,6 +48,7 @@ def short(case, seconds=20.0):
     )
 
 
+@pytest.mark.long
 def test_two_thousand_draws_have_the_shares_they_should():
     drawn = [cases.draw(seed) for seed in range(2000)]
     outside = sum(case.verdict == "unknown" for case in drawn)

@@ -74,6 +74,7 @@ def test_the_moment_is_marked_on_the_chart_and_in_every_plot(at_60, tmp_path):
         rows(path, "/track/harbour/moment", "Points2D:positions")
 
 
+@pytest.mark.long
 @pytest.mark.viewer
 def test_the_viewer_stands_at_the_moment(at_60, tmp_path, no_viewer):
     from shiplog.report.viewer.screenshot import screenshot

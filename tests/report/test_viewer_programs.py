@@ -92,6 +92,7 @@ def test_a_letter_that_the_font_lacks_is_said_in_a_sentence(compared, tmp_path, 
     assert not (tmp_path / "ship.png").exists()
 
 
+@pytest.mark.long
 @pytest.mark.viewer
 def test_the_viewer_shows_every_view_without_complaint(saved, tmp_path, no_viewer):
     from shiplog.report.viewer.screenshot import screenshot
