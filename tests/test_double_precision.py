@@ -88,7 +88,7 @@ def hosted(folder, program=HOST, **variables):
     return done.stdout
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_host_in_single_precision_stays_so_while_shiplog_computes_in_double(tmp_path):
     """And what shiplog compiles, but not what its host does, is kept for the next process."""
     by_jax = {"SHIPLOG_KERNEL": "off"}

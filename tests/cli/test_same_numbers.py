@@ -16,7 +16,7 @@ from pipelines.experiments import simulated_ship
 from pipelines.experiments.same_numbers import content, differing, run_on
 from shiplog.training.runs import run_folder
 
-pytestmark = [pytest.mark.long, pytest.mark.usefixtures("trained_here")]
+pytestmark = [pytest.mark.nightly, pytest.mark.usefixtures("trained_here")]
 SMALL = ("--window", "20", "--store", "store")
 HULL = ("--without", "propeller", "--without", "rudder")  # it compiles quickly
 LEARN = ("--voyages", "trip_1", "--voyages", "trip_2")

@@ -25,7 +25,7 @@ from shiplog.training.settings.run_config import Config, Fast, NetworkSettings
 from shiplog.voyages.store.store import Store
 from shiplog.voyages.windows.split_settings import Split
 
-pytestmark = [pytest.mark.long, pytest.mark.usefixtures("trained_here")]
+pytestmark = [pytest.mark.nightly, pytest.mark.usefixtures("trained_here")]
 SEED = 7101
 
 

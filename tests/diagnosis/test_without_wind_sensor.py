@@ -15,7 +15,7 @@ from shiplog.voyages.store.store import Store
 from shiplog.voyages.windows.split import choose_physical_split
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_without_wind_sensor_what_needs_it_is_not_tested(tmp_path, monkeypatch):
     """A model that nothing was fitted to, on another voyage of that season: it has absorbed
     nothing, so that all else is tested. A hull alone compiles quickly. What can be tested does not

@@ -191,7 +191,7 @@ def test_a_log_that_shows_too_much_speed():
     assert holds(faults["velocity_scale", "velocity"], 1.04)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_nine_of_ten_intervals_hold_the_truth(tmp_path):
     """Twelve voyages, three parameters of the yaw rate each; fewer than 28 of 36 has a chance of
     1 % where each holds with 0.9 (binomial)."""
