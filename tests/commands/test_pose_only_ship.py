@@ -9,7 +9,7 @@ import pytest
 import tomli_w
 from commands import call
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.nightly
 LOGS = Path(__file__).parents[2] / "sample_logs"
 
 
@@ -47,7 +47,6 @@ def test_it_predicts_held_out_voyages_and_its_bands_hold_them(trained):
     assert min(answer["band_90"].values()) > 0.75
 
 
-@pytest.mark.nightly
 def test_it_finds_what_the_second_season_hides(trained):
     """A current and a late GNSS, as `sample_logs/answers/key.json` has them."""
     folder, store, run = trained

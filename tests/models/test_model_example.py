@@ -73,7 +73,7 @@ def test_at_rest_nothing_moves_and_the_rudder_steers_in_the_slipstream(esso):
     assert ahead[0] > 0.0 and ahead[2] > 0.0 and astern[0] < 0.0 and astern[2] == 0.0
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_it_is_trained_evaluated_compared_and_diagnosed(kt, tmp_path):
     """Nothing but the file and the line; what its coefficients cannot distinguish is reported."""
     for number in range(1, 4):
