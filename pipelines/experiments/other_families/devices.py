@@ -175,7 +175,7 @@ def _coupling(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
 
 
 def exchangeable(ship: Ship) -> tuple[tuple[int, int], ...]:
-    """Pairs whose orders differ enough to be told apart: drives at two sides, or azimuths."""
+    """Pairs whose orders differ enough to be distinguished: drives at two sides, or azimuths."""
     return tuple(
         (i, j)
         for i, j in pairs(ship)

@@ -43,7 +43,7 @@ class Fault:
 
 
 def gear_of(count: int, faults: Sequence[Fault]) -> Gear:
-    """Of `count` actuators; what is not among the faults does as it is told."""
+    """Of `count` actuators; what is not among the faults does as ordered."""
     columns = {name: np.zeros(count) for name in ("play", "dead", "stuck", "memory")}
     endless = ("limit", "rate", "stuck_from", "stuck_until")
     columns |= {name: np.full(count, NEVER) for name in endless}
@@ -67,7 +67,7 @@ def sent(g, j, order):
 
 @njit
 def slew(g, j, wanted, lag):
-    """Rate of unit j that is `wanted` away from what it is told to do; `lag` [s], 0 is none."""
+    """Rate of unit j that is `wanted` away from what is ordered; `lag` [s], 0 is none."""
     time = lag if lag > 0.0 else QUICK
     return min(max(wanted / time, -g.rate[j]), g.rate[j])
 

@@ -79,7 +79,7 @@ def acting_of(h, d, track, row, part, dt, state, acting):
 
 @njit
 def _geared(h, d, track, row, part, dt, state, acting):
-    """The same where a unit does not do as it is told, in the order that `gear` has."""
+    """The same where a unit does not do as ordered, in the order that `gear` has."""
     count, g = len(acting), h.gear
     campaign = h.share_start + h.share_slope * (row + part) * dt
     for j in range(count):

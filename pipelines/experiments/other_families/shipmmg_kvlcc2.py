@@ -142,7 +142,7 @@ def move(
             wanted = (order[j] - track[i, 6 + j]) / max(one.time, STEP)
             track[i + 1, 6 + j] = track[i, 6 + j] + STEP * min(max(wanted, -one.rate), one.rate)
         behind = _behind(track[: i + 2, 6], i + 0.5 - e.rudder_delay / STEP)
-        behind = gear.told(0, behind)
+        behind = gear.ordered(0, behind)
         angle = behind
         if e.rudder_lag > 0.0:  # in the middle of the step, as all controls
             before = acting
@@ -152,7 +152,7 @@ def move(
         if e.rudder_limit > 0.0:
             angle = min(max(angle, -e.rudder_limit), e.rudder_limit)
         tow = campaign[0] + (campaign[1] - campaign[0]) * share
-        turns = gear.told(1, 0.5 * (track[i, 7] + track[i + 1, 7]))
+        turns = gear.ordered(1, 0.5 * (track[i, 7] + track[i + 1, 7]))
         controls = (gear.does(0, angle, tow), gear.does(1, turns, tow))
         gear.remember(track[i + 1, 6:])
         track[i + 1, :6] = _step(
@@ -167,7 +167,7 @@ class _Geared:
     def __init__(self, e: Effects) -> None:
         self.gear, self.stood = gear_of(2, e.gear), np.zeros(2)
 
-    def told(self, j: int, order: float) -> float:
+    def ordered(self, j: int, order: float) -> float:
         if not self.gear.wrong:
             return order
         most = STEP * self.gear.rate[j]

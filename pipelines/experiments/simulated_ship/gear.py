@@ -85,7 +85,7 @@ def external_of(pulls: Mapping[str, float]) -> External:
 
 
 @njit
-def told(g, i, order):
+def ordered(g, i, order):
     """What reaches unit i of its order."""
     x = order
     if g.dead[i] > 0.0:
@@ -99,7 +99,7 @@ def told(g, i, order):
 def drive(g, i, order, stands, lag):
     """d/dt of a unit that stands at `stands`."""
     time = lag if lag > 0.0 else FAST
-    return min(max((told(g, i, order) - stands) / time, -g.rate[i]), g.rate[i])
+    return min(max((ordered(g, i, order) - stands) / time, -g.rate[i]), g.rate[i])
 
 
 @njit
@@ -138,7 +138,7 @@ def acting(h, track, row, part, dt, state):
     if h.rudder_limit > 0.0:
         port = min(max(port, -h.rudder_limit), h.rudder_limit)
         starboard = min(max(starboard, -h.rudder_limit), h.rudder_limit)
-    screw = state[11] if g.rate[2] < math.inf else told(g, 2, state[8])
+    screw = state[11] if g.rate[2] < math.inf else ordered(g, 2, state[8])
     return (
         stopped(g, 0, port, time), stopped(g, 1, starboard, time), stopped(g, 2, screw, time)
     )  # fmt: skip
@@ -150,7 +150,7 @@ def _of(h, g, i, track, row, part, dt, state):
     if h.rudder_delay > 0.0:
         return past(track, row, state, 9 + i, row + part - h.rudder_delay / dt)
     slow = h.rudder_lag > 0.0 or g.rate[i] < math.inf
-    return state[9 + i] if slow else told(g, i, state[6 + i])
+    return state[9 + i] if slow else ordered(g, i, state[6 + i])
 
 
 @njit
@@ -159,7 +159,7 @@ def settle(g, port, starboard, screw):
     for i in range(3):
         if g.play[i] > 0.0:
             order = port if i == 0 else (starboard if i == 1 else screw)
-            g.stood[i] = told(g, i, order)
+            g.stood[i] = ordered(g, i, order)
 
 
 @njit

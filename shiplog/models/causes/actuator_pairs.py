@@ -12,7 +12,7 @@ from shiplog.models.causes.actuators import OnUnits
 from shiplog.models.causes.base import Cause, Parameter, ParameterEstimate, Setting
 from shiplog.voyages.rows.recording import Record
 
-ALIKE = 0.02  # share of the extent by which two orders have to differ, to be told from each other
+ALIKE = 0.02  # share of the extent by which two orders have to differ, to be distinguished
 
 
 @dataclass(frozen=True)
