@@ -21,6 +21,7 @@ from shiplog.diagnosis.verdict import (
     baseline_check,
     contradicted_causes,
     exchanged_twins,
+    excluded_causes,
     network_base,
     sign_conventions,
     trial_decision,
@@ -199,7 +200,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> Diagnosis:
     barred = contradicted_causes.barred_causes(contradicted.channels(of.against), profile)
     decided = trial_decision.decide_trial(
         run, nominal, recorded, cut, causes, lacking, reach, barred, before, profile, of.switches,
-        of.share,
+        of.share, _excluded(of),
     )  # fmt: skip
     tried, judge = decided.trial, decided.judge
     decision, found, dropped = decided.decision, decided.gain, dict(decided.refuted)
@@ -255,6 +256,16 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> Diagnosis:
     after = held.extended(decision) if held and decision.named else None
     verdict = answer.verdict(tried, decision, found, held, context)
     return Diagnosis(verdict, out, decision, tried, simulated, whole, held, after)
+
+
+def _excluded(of: Campaigns) -> dict[str, str]:
+    """Label of a cause → how the sensors of the trial, and of the nominal voyages, exclude it."""
+    nominal = of.store.there(of.run.trained_on) if of.nominal is not None else []
+    tables = [
+        {name: table.collect() for name, table in zip(names, of.store.tables(names), strict=True)}
+        for names in (of.names, nominal)
+    ]
+    return excluded_causes.excluded_causes(tables, of.profile)
 
 
 def _nominal(run: Run, store: Store, profile: Profile) -> Record | None:

@@ -21,7 +21,7 @@ from shiplog.voyages.ingest.ingest import ingest
 from shiplog.voyages.store.store import Store
 from shiplog.voyages.windows.augmentation import AUGMENTATIONS
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.nightly
 FEW = ("--window", 20, "--width", 8, "--seeds", 2, "--epochs", 2)
 DATA = ("ref", "sli2", "jit2", "d-ref")
 

@@ -11,7 +11,7 @@ import shiplog
 from shiplog.diagnosis.hypotheses import search
 from shiplog.exceptions import ShiplogError
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.nightly
 
 ROOT = Path(__file__).parents[2]
 # Name in the notebook → sample log. A diagnosis takes as long as its nominal campaign is: 500 s of

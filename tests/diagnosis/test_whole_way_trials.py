@@ -17,7 +17,7 @@ from shiplog.diagnosis.trial.trial import Trial
 from shiplog.diagnosis.verdict import result as decisions
 from shiplog.voyages.rows import timescale  # fmt: skip
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.nightly
 
 # --- what is hidden, and what is not
 

@@ -24,6 +24,10 @@ WRONG = {  # label → what the instruments do, the cause's own numbers for it
     "clock_offset:position": ({"late": {"position": 0.73}}, [0.73]),
     "clock_offset:velocity": ({"late": {"velocity": -0.4}}, [-0.4]),
     "clock_offset:gnss": ({"late": {"position": 0.73, "velocity": 0.73}}, [0.73]),
+    "clock_offset:velocity_turned": ({"late": {"velocity": 0.6}, "by_compass": True}, [0.6]),
+    "clock_offset:gnss_turned": (
+        {"late": {"position": 0.6, "velocity": 0.6}, "by_compass": True}, [0.6],
+    ),
     "clock_offset:yaw_rate": ({"late": {"yaw_rate": 1.21}}, [1.21]),
     "clock_offset:wind": ({"late": {"wind": 0.55}}, [0.55]),
 }  # fmt: skip
@@ -150,6 +154,8 @@ def test_parts_may_differ_in_the_clock_that_position_and_velocity_share():
     assert [(clock.nominal, clock.varies) for clock in clocks] == [(True, True)] * 2 + [
         (False, True)
     ]
+    turned = [by[f"clock_offset:{channel}_turned"] for channel in ("velocity", "gnss")]
+    assert not any(clock.nominal or clock.varies for clock in turned)
     alike = [c for c in CATALOGUE if c.name not in ("clock_offset", "line", "tow")]
     assert all(c.varies == c.nominal for c in alike)
     assert not by["rudder_delay"].varies

@@ -22,7 +22,8 @@ MISSING = {
     "wind_force": "wind", "wind_direction_offset": "wind", "wind_speed_scale": "wind",
     "clock_offset:wind": "wind", "clock_offset:yaw_rate": "yaw rate", "bank": "bank",
     "contact": "bank",
-    "heading_offset:gnss": "over ground",
+    "heading_offset:gnss": "over ground", "clock_offset:velocity_turned": "over ground",
+    "clock_offset:gnss_turned": "over ground",
     "rudder_force": "rudder", "yaw_rate_bias": "yaw rate", "yaw_rate_scale": "yaw rate",
 }  # fmt: skip
 

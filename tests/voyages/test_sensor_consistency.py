@@ -9,6 +9,7 @@ import numpy as np
 import polars as pl
 import pytest
 import sailing
+from body_velocities import BODY, in_body_axes
 
 from pipelines.experiments.simulated_ship import Effects, Wind, sail, write_voyage
 from shiplog.nomenclature import frames
@@ -20,11 +21,6 @@ from shiplog.voyages.sensors import sensor_consistency
 SAMPLES = Path(__file__).parents[2] / "sample_logs"
 DEGREE = np.pi / 180.0
 VECTWIN = profile_file.load("esso-vectwin")
-BODY = sailing.profile(
-    sailing.PROFILE.replace('kind = "sog_cog"', 'kind = "body"')
-    .replace('units = ["kn", "deg"]', 'unit = "m/s"')
-    .replace("lever_arm_m = [0.7, -0.2]", "lever_arm_m = [0.0, 0.0]")
-)
 
 
 @pytest.fixture(scope="module")
@@ -54,33 +50,6 @@ def holds(finding, truth):
     need not be a lucky one. That the interval itself is honest, `coverage` tests over many."""
     assert finding.low < finding.value < finding.high
     return abs(finding.value - truth) < finding.high - finding.low
-
-
-def in_body_axes(seed, late=None, heading_offset=0.0, antenna=(0.0, 0.0), speed_scale=0.0,
-                 seconds=900.0):  # fmt: skip
-    """A table as ingest makes it of a ship whose velocity is measured in body axes."""
-    voyage = sail(seconds, seed=seed, wind=Wind(2.0, 1.0))
-    rng, t, late = np.random.default_rng([seed, 7]), voyage.time, late or {}
-
-    def measured(name, channel, sigma):
-        delay = late.get(channel, 0.0) + late.get("gnss", 0.0) * (
-            channel in ("position", "velocity")
-        )
-        true = np.interp(t - delay, t, getattr(voyage, name))
-        return true + sigma * rng.standard_normal(len(t))
-
-    turned = measured("heading", "position", 0.0)
-    c, s = np.cos(turned), np.sin(turned)
-    return pl.DataFrame({
-        "time": t,
-        "x0": measured("x0", "position", 0.015) + c * antenna[0] - s * antenna[1],
-        "y0": measured("y0", "position", 0.015) + s * antenna[0] + c * antenna[1],
-        "heading": measured("heading", "heading", 0.1 * DEGREE) + heading_offset * DEGREE,
-        "surge": (1.0 + speed_scale) * measured("surge", "velocity", 0.01),
-        "sway": (1.0 + speed_scale) * measured("sway", "velocity", 0.01),
-        "yaw_rate": measured("yaw_rate", "yaw_rate", 0.1 * DEGREE),
-        "quality": np.zeros(len(t), np.int32),
-    })  # fmt: skip
 
 
 def found(table):

@@ -104,7 +104,8 @@ class Hypotheses:
 
     def __post_init__(self) -> None:
         causes = self.trial.reference.model.causes
-        self.catalogue = [c for c in causes if c.label not in self.trial.fixed]
+        apart = (*self.trial.fixed, *self.trial.excluded)
+        self.catalogue = [c for c in causes if c.label not in apart]
         self.by = {cause.label: cause for cause in self.catalogue}
         self.priors = Priors(self.catalogue, tuple(self.trial.families))
 

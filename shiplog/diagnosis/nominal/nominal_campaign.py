@@ -211,7 +211,9 @@ def assume_campaign(
     """Without a nominal campaign: the trial's own voyages take its place, and no cause has a
     nominal size.
 
-    given    coefficients that nobody fitted, held near their values; else a fit to these voyages
+    given    coefficients that nobody fitted, held near their values; else a fit to these voyages.
+             Of a given model every hypothesis estimates the sizes of the discrepancy for itself:
+             those that are estimated without a cause take in what the cause explains
     inputs   a network that was trained on these voyages
     numbers  of causes that were found in these voyages: what they explain is no discrepancy
     """
@@ -233,6 +235,7 @@ def assume_campaign(
     made = replace(
         whole.reference, information=np.diag(K), pull=K * whole.reference.anchor,
         nominal=None, adapts=not given,
+        estimated=tuple(f.columns for f in whole.discrepancy.families) if given else (),
     )  # fmt: skip
     return replace(
         whole,

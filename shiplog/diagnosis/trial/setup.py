@@ -29,6 +29,7 @@ def trial_of(
     run: Run, nominal: Record | None, recorded: Record, own: Sequence[Cause],
     lacking: str = "", numbers: Mapping[str, np.ndarray] | None = None,
     barred: Mapping[str, str] | None = None, parts: Parts = ALL,
+    excluded: Mapping[str, str] | None = None,
 ) -> Setup:  # fmt: skip
     """For a network, the ship's MMG is tested, fitted to the network's training voyages.
 
@@ -37,6 +38,8 @@ def trial_of(
     lacking   why the model cannot identify causes that change forces; empty where it can
     numbers   of causes found in these voyages, where no nominal campaign shows the discrepancy
     barred    name → why a cause is not tested, in addition to what ship and model lack
+    excluded  label → how the sensors exclude a cause: voyages may differ in it as they do, and no
+              hypothesis has it
     parts     of the decision, that act: a part that does not is taken from what was learned
     """
     setting = setting_of(run, nominal if nominal is not None else recorded, recorded)
@@ -52,6 +55,8 @@ def trial_of(
     for cause in [c for c in chosen if c.name in (barred or {})]:
         untested[cause.label] = (barred or {})[cause.name]
         chosen.remove(cause)
+    out = {c.label: (excluded or {})[c.label] for c in chosen if c.label in (excluded or {})}
+    untested |= out
     every: list[Cause] = [*held.values(), *(c for c in chosen if c.label not in held)]
     model, start = model_of(run, every, setting)
     if nominal is None:
@@ -74,4 +79,4 @@ def trial_of(
         if not parts.share_of_trial:
             found = replace(found, share=1.0)
         campaign = nominal_campaign.learn(model, setting, start, nominal, at, found)
-    return Setup(Trial.build(campaign, recorded, tuple(held)), untested)
+    return Setup(Trial.build(campaign, recorded, tuple(held), excluded=tuple(out)), untested)

@@ -38,6 +38,7 @@ class Trial:
     """Voyages in question, against a campaign.
 
     fixed     labels of causes that the model has already, with numbers that stay
+    excluded  labels of causes that no hypothesis has
     parts     rows of the segments [S] of each part; voyage of each part
     unseen    families that no model of forces has, over the trial
     weight    [S] for how much a segment counts; nothing, where the model diverges on it
@@ -58,6 +59,7 @@ class Trial:
     cache: Cache
     first: Point | None = None
     begun: bool = False
+    excluded: tuple[str, ...] = ()
 
     @classmethod
     def build(

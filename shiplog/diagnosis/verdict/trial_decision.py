@@ -63,6 +63,7 @@ def decide_trial(
     barred: Mapping[str, str] | None = None, before: Windows | None = None,
     read_as: Profile | None = None, parts: Parts = ALL,
     share: Callable[[Trial], Trial] = lambda trial: trial,
+    excluded: Mapping[str, str] | None = None,
 ) -> Decided:  # fmt: skip
     """As `setup.trial_of`; `cut` are the voyages' windows, `before` those of the nominal voyages,
     `read_as` the voyages' own profile, and `reach` is called at each stage. `share` gives a trial's
@@ -70,8 +71,9 @@ def decide_trial(
 
     def searched(numbers: Mapping[str, np.ndarray] | None = None) -> _Searched:
         made = setup.trial_of(
-            run, nominal, recorded, causes, lacking, numbers, barred=barred, parts=parts
-        )
+            run, nominal, recorded, causes, lacking, numbers, barred=barred, parts=parts,
+            excluded=excluded,
+        )  # fmt: skip
         return _searched(run, replace(made, trial=share(made.trial)), reach, parts, numbers)
 
     found = searched()

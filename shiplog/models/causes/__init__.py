@@ -51,6 +51,7 @@ CATALOGUE: tuple[Cause, ...] = (
     ActuatorsExchanged(),
     HeadingOffset(), HeadingOffset(turned=True), YawRateBias(), YawRateScale(),
     ClockOffset("position"), ClockOffset("velocity"), ClockOffset("gnss"),
+    ClockOffset("velocity", turned=True), ClockOffset("gnss", turned=True),
     ClockOffset("yaw_rate"), ClockOffset("wind"),
     AntennaOffset(), WindDirectionOffset(), WindSpeedScale(),
 )  # fmt: skip

@@ -111,12 +111,15 @@ class YawRateScale(Cause):
 
 @dataclass(frozen=True)
 class ClockOffset(Cause):
-    """One channel is late against the heading; `gnss` is position and velocity together.
+    """One channel is late against the heading; `gnss` is position and velocity together. Body
+    velocities may be those of a receiver, which the recorder has turned by the present heading:
+    `turned`. Late by τ, they show v - τ r u athwart: the drift of a turn is wrong.
 
     Size: a receiver that reports each second and stamps what arrives is up to a second late (IMO
     MSC.112(73)): 0.58 s in the mean square of such delays."""
 
     channel: str = "gnss"
+    turned: bool = False
 
     name = "clock_offset"
     kind = "sensor"
@@ -135,32 +138,36 @@ class ClockOffset(Cause):
 
     @property
     def label(self) -> str:
-        return f"{self.name}:{self.channel}"
+        return f"{self.name}:{self.channel}" + ("_turned" if self.turned else "")
 
     @property
     def nominal(self) -> bool:
-        return self.channel != "gnss"  # that is position and velocity together
+        # `gnss` is position and velocity together, and of the velocity one form is enough
+        return self.channel != "gnss" and not self.turned
 
     @property
     def varies(self) -> bool:
-        return True  # position and velocity have one clock, and what looks like one, as well
+        # position and velocity have one clock, and what looks like one, as well: one form shows it
+        return not self.turned
 
     def compatible(self, label: str) -> bool:
-        """`gnss` is position and velocity together: two of the three determine the third."""
-        both = {f"{self.name}:{channel}" for channel in ("position", "velocity")}
-        if self.channel == "gnss":
-            return label != self.label and label not in both
-        return label != self.label and not (self.label in both and label == f"{self.name}:gnss")
+        """`gnss` is position and velocity together: two of the three determine the third. A
+        velocity turned by the heading has a time against the position alone."""
+        name, _, other = label.partition(":")
+        if name != self.name or {self.channel, other} & {"yaw_rate", "wind"}:
+            return label != self.label
+        return {self.label, label} == {f"{name}:position", f"{name}:velocity"}
 
     @property
     def needs(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleVariableOverride]
-        return {
+        found: tuple[str, ...] = {
             "wind": ("wind", "wind force"), "yaw_rate": ("yaw rate",), "velocity": ("velocity",),
             "gnss": ("velocity",),
         }.get(self.channel, ())  # fmt: skip
+        return (*found, "body velocity") if self.turned else found
 
     def read(self, record: Record, p: np.ndarray) -> Record:
-        return faults.without_clock_offset(record, self.channel, float(p[0]))
+        return faults.without_clock_offset(record, self.channel, float(p[0]), self.turned)
 
     def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
         late = estimates["time"].value
@@ -170,7 +177,8 @@ class ClockOffset(Cause):
         what = what[0].upper() + what[1:]
         verb = "are" if self.channel == "gnss" else "is"
         how = "late" if late > 0 else "early"
-        return f"{what} {verb} {abs(late):.2f} s {how} against the heading."
+        by = ", by which the recorder turns it" if self.turned else ""
+        return f"{what} {verb} {abs(late):.2f} s {how} against the heading{by}."
 
 
 @dataclass(frozen=True)

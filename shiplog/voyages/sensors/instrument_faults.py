@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from shiplog.nomenclature import frames
 from shiplog.nomenclature.frames import in_body_axes, in_earth_axes
 from shiplog.voyages.rows.recording import Record
 
@@ -42,16 +43,21 @@ def without_velocity_scale(record: Record, excess: float) -> Record:
     return record.measured_as(replace(readings, velocity=readings.velocity / (1.0 + excess)))
 
 
-def without_clock_offset(record: Record, channel: str, late: float) -> Record:
+def without_clock_offset(record: Record, channel: str, late: float, turned: bool = False) -> Record:
     """A channel (position, velocity, gnss for both, yaw_rate or wind) whose samples are stamped
-    `late` [s] after their time."""
+    `late` [s] after their time. With `turned`, body velocities V came late over ground, and the
+    recorder turned them by the heading that it had then: R(ψ(t)) V(t) = Ẋ(t - τ)."""
     if channel == "wind":
         return replace(record, wind=record.later(record.wind, late))
     readings = record.sighted
     if channel in ("position", "gnss"):
         readings = replace(readings, position=record.later(readings.position, late))
     derived = record.profile.sensors.velocity is None and channel == "position"
-    if channel in ("velocity", "gnss") or derived:
+    if channel in ("velocity", "gnss") and turned:
+        over_ground = frames.to_body(readings.velocity, readings.axes.back)
+        velocity = frames.to_body(record.later(over_ground, late), readings.axes)
+        readings = replace(readings, velocity=velocity)
+    elif channel in ("velocity", "gnss") or derived:
         readings = replace(readings, velocity=record.later(readings.velocity, late))
     if channel == "yaw_rate":
         readings = replace(readings, yaw_rate=record.later(readings.yaw_rate, late))
