@@ -126,6 +126,17 @@ def test_nothing_is_not_said_where_too_much_could_not_have_shown(trial, hidden, 
     assert found.ranking["none"] == pytest.approx(posterior.none_of_all)
 
 
+def test_a_cause_that_promises_far_more_than_what_was_weighed_leaves_nothing_sure(trial):
+    """As after a ban: its share is all there is, however many nats, and no number overflows."""
+    made = weighed.search(trial, {((), NOMINAL): 0.98, (DRAG, NOMINAL): 0.02})
+    (label, *_) = [c.label for c in made.table.catalogue if c.label != "drag"]
+    made.scanned[label] = made.table.found[(), NOMINAL].score + 40_000.0
+    found, _ = decide(made)
+    assert found.verdict == "undecided"
+    assert next(iter(found.ranking)) == label.partition(":")[0]
+    assert found.ranking[label.partition(":")[0]] == pytest.approx(1.0)
+
+
 def test_noise_as_on_an_ordinary_day_is_nothing_and_its_factor_is_reported(trial):
     found = verdict(trial, {((), RAISED): 0.96, ((), NOMINAL): 0.04}, raised=1.3)
     assert (found.verdict, found.structure, found.fit.noise_factor) == ("none", None, 1.3)

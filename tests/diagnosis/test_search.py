@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 from searchable import raised_noise, search_of, searched, trial_with
-from straight import CAUSES
+from straight import CAUSES, One
 
 from shiplog.diagnosis.hypotheses import search as searching
 from shiplog.diagnosis.hypotheses import table as hypotheses
@@ -187,6 +187,19 @@ def test_either_of_two_causes_may_exclude_the_other(monkeypatch):
     found = searched({"drag": [1.2], "load": [1.2]})
     assert (("load",), NOMINAL) in found.table.found and (("drag",), NOMINAL) in found.table.found
     assert not [labels for labels, _ in found.table.found if {"drag", "load"} <= set(labels)]
+
+
+def test_another_form_takes_the_place_of_one_that_promised_more(monkeypatch):
+    """Two clocks that exclude each other, and a scan that never proposes the right one."""
+    monkeypatch.setattr(One, "compatible", lambda self, label: label.split(":")[0] != self.name)
+    proposed = searching.additions
+
+    def misled(*given):
+        return [one for one in proposed(*given) if "clock:gnss" not in one[0]]
+
+    monkeypatch.setattr(searching, "additions", misled)
+    found = searched({"clock:gnss": [1.2]}, alike=("clock:wind", "clock:gnss", 0.25))
+    assert found.table.ranked()[0].causes == ("clock:gnss",)
 
 
 def test_what_is_banned_together_stays_alone(monkeypatch):

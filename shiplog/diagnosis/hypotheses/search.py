@@ -7,7 +7,8 @@ Each set of causes is linearised again at its most probable numbers, and weighed
 remainder that could win. One cause is then added to the best hypotheses or dropped from them, until
 no promising set is left. A remainder may explain a part of what a cause explains wholly. As long as
 a cause promises about as much as the best hypothesis has, it is therefore added to nothing as well.
-The order in which sets are weighed matters for those alone that are far behind.
+The order in which sets are weighed matters for those alone that are far behind. Of a cause in the
+best set, forms that exclude each other take its place in turn.
 
 Remainders cost most of a set S. They are left out where a larger set B ⊃ S is far ahead of S and no
 remainder R adds to it. S with R is B with R whose further numbers are zero, so that
@@ -236,6 +237,32 @@ class Search:
                 self._weigh_again(labels, one, fit)
             elif len(self._tried) < self._most:
                 self.weigh(labels, numbers, fit.point)
+        for labels, numbers in self._exchanges(one) if one.score == best else ():
+            if labels not in self._tried and len(self._tried) < self._most:
+                self.weigh(labels, numbers, fit.point)
+
+    def _exchanges(self, one: Hypothesis) -> list[tuple[tuple[str, ...], dict[str, np.ndarray]]]:
+        """The sets with another form of one of the best hypothesis' causes, such as the clock of
+        another channel, where both cannot be in one set: which form promised more where nothing was
+        known of its size is no proof. A form that promised less than LIKELY of it is left out."""
+        table, found = self.table, []
+        nothing = table.nothing.score
+        for label in one.causes:
+            rest = [n for n in one.causes if n != label]
+            for other in table.catalogue:
+                fits = all(_compatible(other, table.by[n]) for n in rest)
+                if name_of(other.label) != name_of(label) or other.label == label or not fits:
+                    continue
+                promised = self.scanned[other.label] - nothing
+                if _compatible(other, table.by[label]) or promised <= 0.0:
+                    continue
+                if promised >= LIKELY * (self.scanned[label] - nothing):
+                    numbers = {n: one.estimate.numbers[n] for n in rest}
+                    numbers[other.label] = np.zeros(other.count)
+                    labels = tuple(sorted((*rest, other.label)))
+                    if not self._banned(labels):
+                        found.append((labels, numbers))
+        return found
 
     def _additions(self, one: Hypothesis, fit: Fit) -> list[Addition]:
         """As `additions`, of causes that are not banned; none beyond `MOST_CAUSES`."""

@@ -27,6 +27,7 @@ from shiplog.models.causes.base import deviations
 STOCHASTIC = "stochastic"  # the contract's word for raised process noise
 FAMILY = {RAISED: STOCHASTIC}
 DRAWS = 400  # of a cause's numbers; a probability of 0.9 is then known to 0.015
+CERTAIN_NATS = 300.0  # of a cause that was only scanned: more decides no more, and overflows
 
 
 @dataclass(frozen=True)
@@ -132,12 +133,14 @@ def posterior(search: Search) -> Posterior:
             none += float(p) * math.prod(1.0 - large for large in by_name.values())
     names = {name: p for name, p in names.items() if p > 0.0}
     weight = float(np.exp(score - score.max()).sum())
+    most = score.max() + CERTAIN_NATS
     hidden: dict[str, float] = {}
     weighed = {h.causes for h in kept} | {(label,) for label in search.diverged}
     for label, one in search.scanned.items():
         if not holds_one(search.table.banned, (label,)) and (label,) not in weighed:
             name = name_of(label)
-            hidden[name] = hidden.get(name, 0.0) + float(np.exp(one - score.max())) / weight
+            p = float(np.exp(min(one, most) - score.max())) / weight
+            hidden[name] = hidden.get(name, 0.0) + p
     order = sorted(names, key=lambda name: -names[name])
     names = {n: names[n] for n in order}
     one_of = _alternatives(names, large_in, share)
