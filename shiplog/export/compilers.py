@@ -16,6 +16,7 @@ from shiplog.exceptions import ShiplogError
 
 OPTIONS = ("-std=c99", "-O2", "-fPIC", "-ffp-contract=off", "-fvisibility=hidden")
 PATIENCE = 300.0  # s: a network of a thousand units compiles in ten
+FIRST_PATIENCE = 1200.0  # s: the first time ziglang compiles a system's C library as well
 LAST = 400  # letters of a compiler's complaint
 
 
@@ -80,24 +81,26 @@ def shared(command: Sequence[str], source: Path, out: Path, system: System) -> N
     strip = [] if "darwin" in system.fmi3 else ["-s"]
     libraries = [] if "windows" in system.fmi3 else ["-lm"]
     plain = [o for o in OPTIONS if o != "-fPIC" or "windows" not in system.fmi3]
-    run([*command, *plain, "-shared", *strip, "-o", out.name, source.name, *libraries],
-        source.parent)  # fmt: skip
+    words = [*command, *plain, "-shared", *strip, "-o", out.name, source.name, *libraries]
+    run(words, source.parent, patience=PATIENCE if len(command) == 1 else FIRST_PATIENCE)
     (source.parent / out.name).replace(out)
     for leaving in (".lib", ".pdb"):  # of Windows
         (source.parent / out.with_suffix(leaving).name).unlink(missing_ok=True)
 
 
-def run(command: Sequence[str], folder: Path, given: bytes | None = None) -> bytes:
+def run(
+    command: Sequence[str], folder: Path, given: bytes | None = None, patience: float = PATIENCE
+) -> bytes:
     """What a program of this machine answers. Raises ShiplogError where it fails."""
     try:
         done = subprocess.run(
-            command, cwd=folder, input=given, capture_output=True, timeout=PATIENCE, check=False,
+            command, cwd=folder, input=given, capture_output=True, timeout=patience, check=False,
             env={**os.environ, "LC_ALL": "C"},
         )  # fmt: skip
     except (OSError, subprocess.TimeoutExpired) as error:
         raise ShiplogError(
             f"{Path(command[0]).name} did not end well: {error}.",
-            hint="export again; --unchecked writes the file without loading it.",
+            hint="export again when this machine is less busy.",
         ) from error
     if done.returncode:
         said = done.stderr.decode(errors="replace")[-LAST:].strip()

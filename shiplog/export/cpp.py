@@ -10,20 +10,29 @@ import numpy as np
 
 from shiplog.export import c_source, compilers
 from shiplog.export.filled import filled
+from shiplog.export.job import Job
 from shiplog.export.not_loaded import NotLoaded
 from shiplog.export.ship import Ship
-from shiplog.export.trial import Trial
+from shiplog.export.trial import Difference, Trial, difference
 from shiplog.machine import files
 
 CONSUMER = "gcc"
 
 
-def write(ship: Ship, path: Path, record: Sequence[str]) -> None:
-    files.write_text(path, c_source.header(ship, record))
+def write(job: Job, path: Path, record: Sequence[str]) -> None:
+    files.write_text(path, c_source.header(job.ship, record))
+
+
+def losses(job: Job) -> tuple[str, ...]:
+    return job.ship.losses
+
+
+def compare(job: Job, path: Path) -> Difference:
+    return difference(job.trial, sail(job.ship, job.trial, path))
 
 
 def sail(ship: Ship, trial: Trial, path: Path) -> np.ndarray:
-    """[n, 6] by a program of it, as C and as C++. Raises NotLoaded without a compiler."""
+    """[n, 6] by a program of it. Raises NotLoaded without a compiler."""
     compiler = compilers.own()
     if compiler is None:
         raise NotLoaded("no C compiler is on this machine")

@@ -10,16 +10,25 @@ import numpy as np
 
 from shiplog.export import statements
 from shiplog.export.filled import filled, inert
+from shiplog.export.job import Job
 from shiplog.export.languages import PYTHON
 from shiplog.export.ship import Ship
-from shiplog.export.trial import Trial
+from shiplog.export.trial import Difference, Trial, difference
 from shiplog.machine import files
 
 CONSUMER = "numpy"
 
 
-def write(ship: Ship, path: Path, record: Sequence[str]) -> None:
-    files.write_text(path, text(ship, record))
+def write(job: Job, path: Path, record: Sequence[str]) -> None:
+    files.write_text(path, text(job.ship, record))
+
+
+def losses(job: Job) -> tuple[str, ...]:
+    return job.ship.losses
+
+
+def compare(job: Job, path: Path) -> Difference:
+    return difference(job.trial, sail(job.ship, job.trial, path))
 
 
 def text(ship: Ship, record: Sequence[str]) -> str:

@@ -46,6 +46,11 @@ class Trial:
     every: int
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Of the state's channels."""
+        return tuple(c.name for c in STATE)
+
+    @property
     def reference(self) -> np.ndarray:
         """[K, 6]"""
         return self.sailed.state[0]
