@@ -43,9 +43,10 @@ class Target:
 
 TARGETS = {
     "fmu": Target("FMI 2.0 unit for co-simulation: OSP, Simulink, Dymola", ".fmu", "fmu"),
-    "fmu3": Target("the same of FMI 3.0", ".fmu", "fmu3"),
+    "fmu3": Target("the same of FMI 3.0", "_fmi3.fmu", "fmu3"),
     "cpp": Target("one header of C99 and C++11", ".h", "cpp"),
     "python": Target("one file of numpy, without shiplog", ".py", "python_file"),
+    "mss": Target("a function of MATLAB and Octave, as MSS has its vessels", ".m", "mss"),
     "mcap": Target("predictions of voyages as a log", ".mcap", "log_of_predictions", PREDICTIONS),
     "parquet": Target("the same as Parquet", ".parquet", "parquet_of_predictions", PREDICTIONS),
     "csv": Target("the coefficients; predictions with --voyages", ".csv", "csv_file", NUMBERS),
