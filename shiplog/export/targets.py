@@ -47,6 +47,7 @@ TARGETS = {
     "cpp": Target("one header of C99 and C++11", ".h", "cpp"),
     "python": Target("one file of numpy, without shiplog", ".py", "python_file"),
     "mss": Target("a function of MATLAB and Octave, as MSS has its vessels", ".m", "mss"),
+    "onnx": Target("a network with its scaling", ".onnx", "onnx_file"),
     "mcap": Target("predictions of voyages as a log", ".mcap", "log_of_predictions", PREDICTIONS),
     "parquet": Target("the same as Parquet", ".parquet", "parquet_of_predictions", PREDICTIONS),
     "csv": Target("the coefficients; predictions with --voyages", ".csv", "csv_file", NUMBERS),

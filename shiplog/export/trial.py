@@ -108,6 +108,11 @@ def _schedule(ship: Ship) -> Schedule:
 def difference(trial: Trial, state: np.ndarray) -> Difference:
     """Of states [n, 6] at the end of each step from the trial's `simulate`."""
     kept = np.concatenate((trial.start[None], state[trial.every - 1 :: trial.every]))
+    return difference_of_rows(trial, kept)
+
+
+def difference_of_rows(trial: Trial, kept: np.ndarray) -> Difference:
+    """Of states [K, 6] at the instants that `simulate` keeps."""
     count = min(len(kept), len(trial.reference))
     kept, reference = kept[:count], trial.reference[:count]
     there = np.isfinite(reference).all(1)
