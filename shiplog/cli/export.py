@@ -22,7 +22,8 @@ def export(
     to: Annotated[
         str,
         typer.Option(
-            metavar="TARGET", help=f"One of {', '.join(TARGETS)}.",
+            metavar="TARGET",
+            help=f"One of {', '.join(TARGETS)}.",
             autocompletion=completion.of_words(tuple(TARGETS)),
         ),
     ],

@@ -30,7 +30,9 @@ def compare(job: Job, path: Path) -> Difference:
     read = pl.read_csv(path, infer_schema_length=None)
     if job.voyages:
         return predictions.apart(job, read)
-    return numbers_of_run.apart(numbers_of_run.frame(job), dict(read.select("name", "value").rows()))
+    return numbers_of_run.apart(
+        numbers_of_run.frame(job), dict(read.select("name", "value").rows())
+    )
 
 
 def version() -> str:

@@ -1,10 +1,10 @@
 """`--to fmu`, of FMI 2.0, and the parts of `--to fmu3`: a functional mock-up unit for co-simulation, of C alone.
 
-    modelDescription.xml   variables, units, what it can do
-    sources/               ship.h, component.h, and fmi2.c or fmi3.c: enough to compile it anywhere
-    binaries/              for this machine; with ziglang also for others, of which none is run here
-    resources/             shiplog.json: what was compared; OspModelDescription.xml: OSP's groups
-    documentation/         index.html (or index.txt): what it is
+modelDescription.xml   variables, units, what it can do
+sources/               ship.h, component.h, and fmi2.c or fmi3.c: enough to compile it anywhere
+binaries/              for this machine; with ziglang also for others, of which none is run here
+resources/             shiplog.json: what was compared; OspModelDescription.xml: OSP's groups
+documentation/         index.html (or index.txt): what it is
 """
 
 from __future__ import annotations
@@ -133,7 +133,8 @@ def _library(
 def _page(ship: Ship, record: Sequence[str], facts: Mapping[str, Any]) -> str:
     rows = "".join(f"<li>{html.escape(line)}</li>" for line in (*record, *ship.losses))
     built = "".join(
-        f"<li>{html.escape(name)}: {html.escape(how)}</li>" for name, how in facts["binaries"].items()
+        f"<li>{html.escape(name)}: {html.escape(how)}</li>"
+        for name, how in facts["binaries"].items()
     )
     return (
         "<!DOCTYPE html><html lang='en'><head><meta charset='utf-8'>"

@@ -160,6 +160,10 @@ def _type(one: Variable) -> dict[str, str]:
 
 def _text(root: xml.Element) -> str:
     xml.indent(root)
-    return xml.tostring(root, "unicode", xml_declaration=True) .replace(
-        "<?xml version='1.0' encoding='us-ascii'?>", '<?xml version="1.0" encoding="UTF-8"?>'
-    ).replace("<?xml version='1.0' encoding='UTF-8'?>", '<?xml version="1.0" encoding="UTF-8"?>')
+    return (
+        xml.tostring(root, "unicode", xml_declaration=True)
+        .replace(
+            "<?xml version='1.0' encoding='us-ascii'?>", '<?xml version="1.0" encoding="UTF-8"?>'
+        )
+        .replace("<?xml version='1.0' encoding='UTF-8'?>", '<?xml version="1.0" encoding="UTF-8"?>')
+    )

@@ -81,7 +81,9 @@ def of_ship(ship: Ship) -> list[Variable]:
     ]  # fmt: skip
     return [
         *found,
-        Variable("recorded", "orders are recorded positions: no rate limits them", FIXED, start=False),
+        Variable(
+            "recorded", "orders are recorded positions: no rate limits them", FIXED, start=False
+        ),
         Variable("diverged", "it is where no ship goes", OUTPUT),
     ]
 

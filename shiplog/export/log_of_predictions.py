@@ -1,8 +1,8 @@
 """`--to mcap`: predictions of a voyage as the contract's topics, beside what was measured.
 
-    /sim/<run>/state   what the run predicts, beginning at the measured state of each window
-    /ship/state        what was measured
-    /rudder/<name> …   the actuators; /wind/apparent
+/sim/<run>/state   what the run predicts, beginning at the measured state of each window
+/ship/state        what was measured
+/rudder/<name> …   the actuators; /wind/apparent
 """
 
 from __future__ import annotations
@@ -39,7 +39,11 @@ def write(job: Job, path: Path, record: Sequence[str]) -> None:
             hint="export each with --voyages and an --out of its own; --to parquet takes several.",
         )
     time = rows["time"].to_physical().to_numpy()
-    notes = {"model": job.run.name, "predicted": " ".join(record), "window_s": str(job.run.config.window)}
+    notes = {
+        "model": job.run.name,
+        "predicted": " ".join(record),
+        "window_s": str(job.run.config.window),
+    }
     write_log(
         path, [*_states(rows, time, job.run.name), *_inputs(job, rows, time)],
         ship=job.run.profile.ship.name, datum=job.store.origin(names[0])[1], notes=notes,

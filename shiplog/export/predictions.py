@@ -63,9 +63,7 @@ def _frame(job: Job) -> pl.DataFrame:
         for i, c in enumerate(STATE):
             one = values[..., i].reshape(count * size)
             columns[prefix + c.name] = wrap(one) if c.circular else one
-    columns |= {
-        n: cut.actuator[..., i].reshape(-1) for i, n in enumerate(profile.actuator_names)
-    }
+    columns |= {n: cut.actuator[..., i].reshape(-1) for i, n in enumerate(profile.actuator_names)}
     columns |= {n: cut.wind[..., i].reshape(-1) for i, n in enumerate(profile.wind_names)}
     found = pl.DataFrame(columns)
     # each sample of a window is a row of its voyage: its stamp is that row's

@@ -1,4 +1,4 @@
-"""`--to toml`: the coefficients as `train --parameters` takes them, and the numbers of causes."""
+"""`--to toml`: the coefficients as `train --parameters` takes them."""
 
 from __future__ import annotations
 
@@ -18,19 +18,25 @@ CONSUMER = "shiplog train --parameters"
 
 
 def write(job: Job, path: Path, record: Sequence[str]) -> None:
-    rows = numbers_of_run.frame(job)
     sections: dict[str, dict[str, float]] = {}
-    for name, value, cause in rows.select("name", "value", "cause").rows():
-        part, key = (f"cause.{cause}", name.removeprefix(f"{cause}.")) if cause else \
-            name.split(".", 1)  # fmt: skip
-        sections.setdefault(part, {})[key] = value
+    causes = []
+    columns = ("name", "value", "unit", "cause")
+    for name, value, unit, cause in numbers_of_run.frame(job).select(columns).rows():
+        if cause:  # `train --parameters` refuses sections that no force reads
+            causes.append(f"{name} = {value!r} {unit}")
+        else:
+            part, key = name.split(".", 1)
+            sections.setdefault(part, {})[key] = value
     text = tomli_w.dumps({"source": f"shiplog's run {inert(job.run.name)}", **sections})
-    head = [job.run.label, "Numbers of the base are without unit, of a cause in its displayed unit."]
-    files.write_text(path, "".join(f"# {inert(line)}\n" for line in (*head, *record)) + text)
+    head = [job.run.label, *record, *(f"cause: {one}" for one in causes)]
+    files.write_text(path, "".join(f"# {inert(line)}\n" for line in head) + text)
 
 
 def losses(job: Job) -> tuple[str, ...]:
-    return numbers_of_run.losses(job)
+    found = numbers_of_run.losses(job)
+    if job.run.extension is None:
+        return found
+    return (*found, "The numbers of its causes as values: they are comments.")
 
 
 def compare(job: Job, path: Path) -> Difference:
