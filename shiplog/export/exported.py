@@ -1,4 +1,4 @@
-"""A file of a target: written, loaded again by its consumer, compared, and said what is not in it."""
+"""A target's file: written, loaded again by its consumer, compared; and what is not in it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`--to fmu`, of FMI 2.0, and the parts of `--to fmu3`: a functional mock-up unit for co-simulation, of C alone.
+"""`--to fmu`, of FMI 2.0, and the parts of `--to fmu3`: a unit for co-simulation, of C alone.
 
 modelDescription.xml   variables, units, what it can do
 sources/               ship.h, component.h, and fmi2.c or fmi3.c: enough to compile it anywhere

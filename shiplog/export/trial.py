@@ -1,8 +1,8 @@
 """The schedule on which what was written sails against `simulate`, and how far they come apart.
 
-600 s (`SECONDS`) from the approach, in wind and current, in which every actuator moves: rudders and azimuths
-to both sides, propellers up and down. Rate limits, gear and water are all in it. A consumer gets
-the orders step by step; the greatest difference is over all instants that `simulate` keeps.
+600 s from the approach, in wind and current, in which every actuator moves: rudders and azimuths to
+both sides, propellers up and down. Rate limits, gear and water are all in it. A consumer gets the
+orders step by step; the greatest difference is over all instants that `simulate` keeps.
 """
 
 from __future__ import annotations

@@ -17,7 +17,8 @@ def sailed(tmp_path_factory):
     log = Path(__file__).parents[2] / "sample_logs" / "voyage_1.mcap"
     assert call("ingest", log, "--store", folder / "store")[0] == 0
     code, _, said = call("train", "--store", folder / "store", "--out", folder / "whole",
-                         "--window", 25, "--model", "mmg", "--no-fit", "--voyages", "voyage_1")  # fmt: skip
+                         "--window", 25, "--model", "mmg", "--no-fit",
+                         "--voyages", "voyage_1")  # fmt: skip
     assert code == 0, said
     return folder
 

@@ -130,7 +130,7 @@ def test_a_state_is_kept_and_set_again(sailing):
 def test_what_it_refuses(sailing):
     ship = sailing()
     ship.step(100.0, 1.0)
-    with pytest.raises(Exception, match="doStep|DoStep"):
+    with pytest.raises(Exception, match=r"doStep|DoStep"):
         ship.fmu.doStep(currentCommunicationPoint=150.0, communicationStepSize=1.0)
     for name, value in (("order.rudder_port", np.nan), ("x0", 1.0), ("start.x0", 1.0),
                         ("rate.propeller", 0.0)):  # fmt: skip
