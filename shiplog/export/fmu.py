@@ -11,14 +11,17 @@ from __future__ import annotations
 
 import html
 import json
+import re
 import uuid
 import zipfile
 from collections.abc import Mapping, Sequence
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from shiplog.exceptions import ShiplogError, listed
 from shiplog.export import c_source, compilers, fmu_description, fmu_variables
 from shiplog.export.filled import filled, inert
 from shiplog.export.job import Job
@@ -40,7 +43,26 @@ def write(job: Job, path: Path, record: Sequence[str]) -> None:
 
 
 def losses(job: Job) -> tuple[str, ...]:
-    return job.ship.losses
+    return losses_of(job, "2")
+
+
+def losses_of(job: Job, version: str) -> tuple[str, ...]:
+    """With the systems that it has no library for, or one that nobody has run."""
+    there, lacking = [], []
+    for system in compilers.SYSTEMS:
+        folder = system.fmi2 if version == "2" else system.fmi3
+        if folder and folder not in here():
+            (lacking if compilers.for_system(system) is None else there).append(folder)
+    found = list(job.ship.losses)
+    if there:
+        found.append(f"Libraries for {listed(there)} are compiled, and were never run.")
+    if lacking:
+        found.append(
+            f"Libraries for {listed(lacking)}: sources alone; 'shiplog[cross]' compiles them."
+        )
+    if compilers.own() is None and compilers.zig() is None:
+        found.append("A library for this machine: there is no C compiler.")
+    return tuple(found)
 
 
 def compare(job: Job, path: Path) -> Difference:
@@ -127,7 +149,24 @@ def _library(
             (folder / name).write_text(text, encoding="utf-8")
         out = folder / "binary" / f"{ship.identifier}{system.ending}"
         compilers.shared(command, folder / f"fmi{version}.c", out, system)
-        return out.read_bytes()
+        library = out.read_bytes()
+    missing = [name for name in functions(version) if name.encode() not in library]
+    if missing:
+        raise ShiplogError(
+            f"The library for {system.fmi3} lacks {listed(missing)}.",
+            hint="report it with the version of the compiler; without ziglang only this machine's "
+            "library is written.",
+        )
+    return library
+
+
+def functions(version: str) -> list[str]:
+    """All that a library of FMI version 2 or 3 exports."""
+    text = resources.files(__package__).joinpath("templates", f"fmi{version}.c").read_text("utf-8")
+    found = re.findall(rf"(?:FMI{version}|REFUSED|REFUSED_PLAIN|NONE)\((fmi{version}\w+)", text)
+    for kind in re.findall(r"^NONE\((?!fmi)(\w+),", text, re.MULTILINE):
+        found += [f"fmi{version}Get{kind}", f"fmi{version}Set{kind}"]
+    return sorted(set(found))
 
 
 def _page(ship: Ship, record: Sequence[str], facts: Mapping[str, Any]) -> str:

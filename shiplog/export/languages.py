@@ -29,6 +29,7 @@ class Language:
     declared    of a name and an expression: a statement, of numbers and of truth values
     element     of an array's name and a place from 0 on
     store       likewise, with the value to keep there
+    turn        where cosine and sine of the heading are known already; None where they are not
     """
 
     operations: Mapping[str, str]
@@ -39,6 +40,7 @@ class Language:
     element: str
     store: str
     one_based: bool = False
+    turn: tuple[str, str] | None = None
 
     def number(self, value: float) -> str:
         if value != value:
@@ -65,7 +67,7 @@ C = Language(
     },
     infinite="HUGE_VAL", none="NAN", truth=("1", "0"),
     declared=("const double {0} = {1};", "const int {0} = {1};"),
-    element="{0}[{1}]", store="{0}[{1}] = {2};",
+    element="{0}[{1}]", store="{0}[{1}] = {2};", turn=("turn[0]", "turn[1]"),
 )  # fmt: skip
 
 PYTHON = Language(

@@ -17,6 +17,7 @@ from shiplog.export.languages import Language
 from shiplog.simulation.kernel.graph import Graph
 
 LONGEST = 60  # letters of an expression that is still written inside another
+HEADING = 4  # of the state
 STATE_NAMES = {1: "u", 3: "v", 4: "psi", 5: "r"}  # of the state as the field has them
 
 
@@ -121,10 +122,18 @@ class _Writer:
             self._known[node] = self._language.at("p", rest[0])
         elif kind == "varying":
             self._known[node] = self._input(rest[0])
+        elif kind in ("cos", "sin") and self._turns(rest[0]):
+            turn = self._language.turn
+            assert turn is not None
+            self._known[node] = turn[0] if kind == "cos" else turn[1]
         elif kind == DOT:
             self._known[node] = self._row(rest)
         else:
             self._keep(node, self._language.operations[kind].format(*map(self.of, rest)))
+
+    def _turns(self, node: int) -> bool:
+        """Whether it is the heading, whose cosine and sine are known."""
+        return self._language.turn is not None and self._g.nodes[node] == ("varying", HEADING)
 
     def _input(self, place: int) -> str:
         if place in STATE_NAMES:

@@ -109,7 +109,7 @@ static void memory_start(memory *m) {
 
 /* From one communication point to the next. `said` [200]: what is to be known of it. */
 static int memory_step(memory *m, double at, double seconds, char *said) {
-    double end = at + seconds, begun;
+    double end = at + seconds, turn[2], begun;
     const int before = m->ship.diverged;
     int i;
     said[0] = 0;
@@ -130,7 +130,7 @@ static int memory_step(memory *m, double at, double seconds, char *said) {
     begun = end - (m->origin + m->steps * @NAME@_STEP);
     if (begun > ROUNDED) {
         @NAME@_take(&m->ship, &m->parameters, &m->input);
-        @NAME@_within(&m->ship, &m->parameters, begun, m->state, m->actuator);
+        @NAME@_within(&m->ship, &m->parameters, begun, m->state, turn, m->actuator);
     } else {
         memcpy(m->state, m->ship.state, sizeof m->state);
         memcpy(m->actuator, m->ship.actuator, sizeof m->actuator);

@@ -35,12 +35,14 @@ typedef struct {
 } @NAME@_parameters;
 
 /* state      x0, surge, y0, sway, heading, yaw rate, over ground, at the last step's end
+ * turn       cosine and sine of its heading
  * actuator   positions there, as recorded
  * past       what was recorded before, for the steering's delay; lagged: its lag's state
  * begun      whether the next step's accelerations are known: its inputs were taken */
 typedef struct {
     double constant[@NAME@_CONSTANTS + 1];
     double state[6];
+    double turn[2];
     double actuator[@NAME@_ACTUATORS];
     double acceleration[3];
     double lagged[@NAME@_ACTUATORS];
@@ -72,35 +74,37 @@ static void @NAME@_prepare(const double *p, double *c) {
 }
 
 /* Accelerations [3] of x: x0, surge, y0, sway, heading, yaw rate, the actuators, and the true wind
- * along x0 and y0, all relative to the water. */
-static void @NAME@_accelerations(const double *c, const double *x, double *acceleration) {
+ * along x0 and y0, all relative to the water; turn: cosine and sine of the heading. */
+static void @NAME@_accelerations(const double *c, const double *x, const double *turn,
+                                 double *acceleration) {
 @VARYING@
     acceleration[0] = @SURGE@;
     acceleration[1] = @SWAY@;
     acceleration[2] = @YAW@;
     (void)c;
+    (void)turn;
 }
 
 /* Velocities over ground (sign = 1) or through the water (-1) of the other ones. */
-static void @NAME@_across(double *state, const double *current, double sign) {
-    const double c = cos(state[4]), s = sin(state[4]);
+static void @NAME@_across(double *state, const double *turn, const double *current, double sign) {
+    const double c = turn[0], s = turn[1];
     state[1] += sign * (c * current[0] + s * current[1]);
     state[3] += sign * (c * current[1] - s * current[0]);
 }
 
 /* A state through the water a step on: velocities by Euler, place and heading by the trapezoidal
  * rule; the water moves over ground. */
-static void @NAME@_advance(const double *state, const double *rate, const double *current,
-                           double step, double *next) {
-    double c = cos(state[4]), s = sin(state[4]), north, east;
+static void @NAME@_advance(const double *state, const double *turn, const double *rate,
+                           const double *current, double step, double *next, double *next_turn) {
+    double c = turn[0], s = turn[1], north, east;
     next[1] = state[1] + step * rate[0];
     next[3] = state[3] + step * rate[1];
     next[5] = state[5] + step * rate[2];
     next[4] = state[4] + 0.5 * step * (state[5] + next[5]);
     north = c * state[1] - s * state[3];
     east = s * state[1] + c * state[3];
-    c = cos(next[4]);
-    s = sin(next[4]);
+    c = next_turn[0] = cos(next[4]);
+    s = next_turn[1] = sin(next[4]);
     north += c * next[1] - s * next[3];
     east += s * next[1] + c * next[3];
     next[0] = state[0] + step * (0.5 * north + current[0]);
@@ -168,6 +172,8 @@ static void @NAME@_begin(@NAME@_ship *ship, const @NAME@_parameters *p, const do
     memset(ship, 0, sizeof *ship);
     @NAME@_prepare(p->coefficient, ship->constant);
     memcpy(ship->state, state, 6 * sizeof(double));
+    ship->turn[0] = cos(state[4]);
+    ship->turn[1] = sin(state[4]);
     memcpy(ship->actuator, actuator ? actuator : @NAME@_APPROACH, sizeof ship->actuator);
 }
 
@@ -178,39 +184,40 @@ static void @NAME@_take(@NAME@_ship *ship, const @NAME@_parameters *p, const @NA
     if (ship->begun) return;
     ship->held = *input;
     memcpy(x, ship->state, 6 * sizeof(double));
-    @NAME@_across(x, current, -1.0);
+    @NAME@_across(x, ship->turn, current, -1.0);
     @NAME@_move(p, ship->actuator, input->order, @NAME@_STEP, end, mean);
     @NAME@_act(ship, mean, x + 6);
     x[6 + @NAME@_ACTUATORS] = input->wind[0] + current[0];
     x[7 + @NAME@_ACTUATORS] = input->wind[1] + current[1];
-    @NAME@_accelerations(ship->constant, x, ship->acceleration);
+    @NAME@_accelerations(ship->constant, x, ship->turn, ship->acceleration);
     if (@HEUN@) { /* of coefficients that were not fitted to Euler's steps */
-        double ahead[6 + @NAME@_ACTUATORS + 2], second[3];
+        double ahead[6 + @NAME@_ACTUATORS + 2], turn[2], second[3];
         int i;
         memcpy(ahead, x, sizeof x);
-        @NAME@_advance(x, ship->acceleration, current, @NAME@_STEP, ahead);
-        @NAME@_accelerations(ship->constant, ahead, second);
+        @NAME@_advance(x, ship->turn, ship->acceleration, current, @NAME@_STEP, ahead, turn);
+        @NAME@_accelerations(ship->constant, ahead, turn, second);
         for (i = 0; i < 3; ++i) ship->acceleration[i] = 0.5 * (ship->acceleration[i] + second[i]);
     }
     ship->begun = ship->sailed = 1;
 }
 
-/* State [6] over ground and actuators, `seconds` into a step that was begun. */
+/* State [6] over ground, its turn and actuators, `seconds` into a step that was begun. */
 static void @NAME@_within(const @NAME@_ship *ship, const @NAME@_parameters *p, double seconds,
-                          double *state, double *actuator) {
+                          double *state, double *turn, double *actuator) {
     double now[6], mean[@NAME@_ACTUATORS];
     memcpy(now, ship->state, sizeof now);
-    @NAME@_across(now, ship->held.current, -1.0);
-    @NAME@_advance(now, ship->acceleration, ship->held.current, seconds, state);
-    @NAME@_across(state, ship->held.current, 1.0);
+    @NAME@_across(now, ship->turn, ship->held.current, -1.0);
+    @NAME@_advance(now, ship->turn, ship->acceleration, ship->held.current, seconds, state, turn);
+    @NAME@_across(state, turn, ship->held.current, 1.0);
     @NAME@_move(p, ship->actuator, ship->held.order, seconds, actuator, mean);
 }
 
 /* A whole step of @NAME@_STEP seconds. 0, or 1 where it has diverged: no ship goes there. */
 static int @NAME@_step(@NAME@_ship *ship, const @NAME@_parameters *p, const @NAME@_input *input) {
-    double state[6], actuator[@NAME@_ACTUATORS];
+    double state[6], turn[2], actuator[@NAME@_ACTUATORS];
     @NAME@_take(ship, p, input);
-    @NAME@_within(ship, p, @NAME@_STEP, state, actuator);
+    @NAME@_within(ship, p, @NAME@_STEP, state, turn, actuator);
+    memcpy(ship->turn, turn, sizeof turn);
     memcpy(ship->state, state, sizeof state);
     memcpy(ship->actuator, actuator, sizeof actuator);
     ship->begun = 0;
