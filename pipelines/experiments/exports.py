@@ -63,7 +63,9 @@ int main(void) {
     return ship.state[1] > 1e9;
 }
 """
-HEAD = "| `--to` | loaded by | greatest difference | size | not in it |\n| --- | --- | --- | --- | --- |"
+HEAD = """\
+| `--to` | loaded by | greatest difference | size | not in it |
+| --- | --- | --- | --- | --- |"""
 
 
 def row(done: Exported, job: Job) -> str:

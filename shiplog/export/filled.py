@@ -12,7 +12,7 @@ _UNSAFE = re.compile(r"[^\w .,:;()+\-=/%']", re.ASCII)
 
 def filled(template: str, words: Mapping[str, str]) -> str:
     """The text of a file of `templates`. Raises KeyError for a word that is not given."""
-    text = resources.files(__package__).joinpath("templates", template).read_text("utf-8")
+    text = resources.files("shiplog.export").joinpath("templates", template).read_text("utf-8")
     return replaced(text, words)
 
 

@@ -162,7 +162,11 @@ def _library(
 
 def functions(version: str) -> list[str]:
     """All that a library of FMI version 2 or 3 exports."""
-    text = resources.files(__package__).joinpath("templates", f"fmi{version}.c").read_text("utf-8")
+    text = (
+        resources.files("shiplog.export")
+        .joinpath("templates", f"fmi{version}.c")
+        .read_text("utf-8")
+    )
     found = re.findall(rf"(?:FMI{version}|REFUSED|REFUSED_PLAIN|NONE)\((fmi{version}\w+)", text)
     for kind in re.findall(r"^NONE\((?!fmi)(\w+),", text, re.MULTILINE):
         found += [f"fmi{version}Get{kind}", f"fmi{version}Set{kind}"]

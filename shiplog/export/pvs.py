@@ -50,8 +50,8 @@ def compare(job: Job, path: Path) -> Difference:
     sample = job.ship.step / max(1, round(job.ship.step / SAMPLE))
     apart = difference(job.trial, driven(job.ship, job.trial, path, sample))
     raise NotLoaded(
-        f"no package index has it; driven as its main loop drives a vehicle, at {sample:g} s, place "
-        "differs by "
+        f"no package index has it; driven as its main loop does, every {sample:g} s, place differs "
+        "by "
         f"{max(apart.by_channel['x0'], apart.by_channel['y0']):.2g} m and heading by "
         f"{np.degrees(apart.by_channel['heading']):.2g} deg after {apart.seconds:.0f} s, as it "
         "integrates them otherwise"

@@ -118,7 +118,8 @@ def write(job: Job, path: Path, record: Sequence[str]) -> None:
     ]  # fmt: skip
     lines = ['"""', *(inert(line) for line in head), '"""', "",
              "from shipmmg.mmg_3dof import Mmg3DofBasicParams, Mmg3DofManeuveringParams", "",
-             f"DENSITY = {found.density!r}  # kg/m3", "basic_params = Mmg3DofBasicParams("]  # fmt: skip
+             f"DENSITY = {found.density!r}  # kg/m3",
+             "basic_params = Mmg3DofBasicParams("]  # fmt: skip
     lines += [f"    {name}={value!r}," for name, value in found.basic.items()]
     lines += [")", "maneuvering_params = Mmg3DofManeuveringParams("]
     lines += [f"    {name}={value!r}," for name, value in found.manoeuvring.items()]
@@ -147,7 +148,9 @@ def compare(job: Job, path: Path) -> Difference:
     """In still water and calm, with the actuators as `simulate` moved them. Raises NotLoaded
     without shipmmg."""
     try:
-        from shipmmg.mmg_3dof import simulate_mmg_3dof
+        from shipmmg.mmg_3dof import (  # pyright: ignore[reportMissingImports]  # an optional extra
+            simulate_mmg_3dof,
+        )
     except ImportError as error:
         raise NotLoaded("shipmmg is not installed (pip install shipmmg)") from error
     known: dict[str, Any] = {}

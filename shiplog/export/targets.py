@@ -48,9 +48,7 @@ TARGETS = {
     "python": Target("one file of numpy, without shiplog", ".py", "python_file"),
     "mss": Target("a function of MATLAB and Octave, as MSS has its vessels", ".m", "mss"),
     "shipmmg": Target("parameter objects of shipmmg", "_shipmmg.py", "shipmmg_file", exact=False),
-    "pvs": Target(
-        "a vehicle of the Python Vehicle Simulator", "_vehicle.py", "pvs", exact=False
-    ),
+    "pvs": Target("a vehicle of the Python Vehicle Simulator", "_vehicle.py", "pvs", exact=False),
     "gazebo": Target("the hydrodynamics plugin of Gazebo", ".sdf", "gazebo", exact=False),
     "vrx": Target("the hydrodynamics plugin of VRX", "_vrx.sdf", "vrx", exact=False),
     "onnx": Target("a network with its scaling", ".onnx", "onnx_file"),

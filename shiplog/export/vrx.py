@@ -39,9 +39,7 @@ def write(job: Job, path: Path, record: Sequence[str]) -> None:
     for name, one in TERMS.items():
         gazebo.put(plugin, name, repr(-of.values[one]))
     w = job.sailor.training.select("surge", "sway", "yaw_rate").to_numpy()
-    most = max(
-        float(abs(of.values[one] * hull_terms.term(one, w)).max()) for one in TERMS.values()
-    )
+    most = max(float(abs(of.values[one] * hull_terms.term(one, w)).max()) for one in TERMS.values())
     gazebo.put(plugin, "max_effort", repr(ROOM * most))
     files.write_text(path, gazebo.text(job, of, plugin, record))
 
@@ -61,8 +59,7 @@ def losses(job: Job) -> tuple[str, ...]:
 def compare(job: Job, path: Path) -> Difference:
     """Raises NotLoaded."""
     raise NotLoaded(
-        "it is not installed here; the names and signs are those of vrx_gz's "
-        "SimpleHydrodynamics.cc"
+        "it is not installed here; the names and signs are those of vrx_gz's SimpleHydrodynamics.cc"
     )
 
 

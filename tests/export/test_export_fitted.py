@@ -1,4 +1,4 @@
-"""Targets of another form: what they would compute, worked out here by their published equations."""
+"""Targets of another form: what they would compute, worked out by their published equations."""
 
 import json
 from xml.etree import ElementTree as xml
@@ -115,7 +115,9 @@ def test_a_vehicle_has_what_the_main_loop_asks(job, tmp_path):
             rows = np.vstack([rows, np.append(np.append(np.append(eta, nu), control), u)])
             nu, u = vehicle.dynamics(eta, nu, u, control, 0.5)
             c, s = np.cos(eta[5]), np.sin(eta[5])
-            eta = eta + 0.5 * np.array([c * nu[0] - s * nu[1], s * nu[0] + c * nu[1], 0, 0, 0, nu[5]])
+            eta = eta + 0.5 * np.array(
+                [c * nu[0] - s * nu[1], s * nu[0] + c * nu[1], 0, 0, 0, nu[5]]
+            )
         assert np.isfinite(rows).all() and np.ptp(rows[:, 5]) > 0.1
     assert abs(np.degrees(rows[-1, 5]) - 20.0) < 8.0
 
@@ -127,8 +129,6 @@ def test_shipmmg_refuses_two_rudders(whole, tmp_path):
 
 def test_shipmmgs_polynomial_has_a_hull_of_its_own_form(job, monkeypatch):
     """A force that is a polynomial is found again, with the sign of a resistance."""
-    model, _ = hull_terms.physics(job)
-    g = model.geometry
     wanted = {"R_0_dash": 0.022, "X_vv_dash": -0.04, "Y_v_dash": -0.315, "N_rrr_dash": -0.013}
 
     def polynomial(p, g, u, v, r):
@@ -170,7 +170,10 @@ def test_equations_of_a_hybrid_are_its_own(tmp_path):
     theta[-12:] = rng.normal(size=12)
     made = equations.of_model(model, len(theta), 2, share=False)
     text = statements.written(made, languages.PYTHON, lambda *_: [])
-    known = {name: getattr(np, name) for name in dir(np)} | {"p": theta, "c": [0.0] * text.constants}
+    known = {name: getattr(np, name) for name in dir(np)} | {
+        "p": theta,
+        "c": [0.0] * text.constants,
+    }
     exec("\n".join(text.hoisted), known)
     for _ in range(20):
         x = rng.normal(size=10) * (5, 0.5, 5, 0.2, 2, 0.1, 2, 0.4, 3, 3)
