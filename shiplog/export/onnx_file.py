@@ -99,11 +99,9 @@ def _nodes(network: Any, inputs: list[str], known: list[Any], helper: Any) -> li
         speed, angle = "wind_speed", "wind_angle"
         nodes.append(helper.make_node("Split", ["wind"], [speed, angle], axis=1))
         if network.shape.wind_input == "components":
-            # ahead = U sin(γ + π/2): some runtimes have no cosine of doubles
-            quarter = put("Add", [angle, constant("quarter", [math.pi / 2.0])], "turned")
-            for name, of in (("ahead", quarter), ("starboard", angle)):
-                sine = put("Sin", [of], f"{name}_share")
-                parts.append(put("Mul", [speed, sine], name))
+            for name, function in (("ahead", "Cos"), ("starboard", "Sin")):
+                share = put(function, [angle], f"{name}_share")
+                parts.append(put("Mul", [speed, share], name))
         else:
             turn = constant("turn", [2.0 * math.pi])
             turns = put("Floor", [put("Div", [angle, turn], "share_of_turn")], "turns")

@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from shiplog.export.equations import DOT, STATES, Equations
+from shiplog.export.equations import DOT, Equations
 from shiplog.export.languages import Language
 from shiplog.simulation.kernel.graph import Graph
 
@@ -110,18 +110,18 @@ class _Writer:
             return self._language.number(rest[0])
         if kind == "truth":
             return self._language.truth[0 if rest[0] else 1]
+        if kind == "varying":
+            return self._input(rest[0])
         assert self._varying and node in self._places, kind
         found = self._language.at("c", self._places[node])
         return f"({found} != 0)" if self._g.is_truth(node) else found
 
     def compute(self, node: int) -> None:
         kind, *rest = self._g.nodes[node]
-        if kind in ("const", "truth"):
+        if kind in ("const", "truth", "varying"):  # written where they are used
             return
         if kind == "fixed":
             self._known[node] = self._language.at("p", rest[0])
-        elif kind == "varying":
-            self._known[node] = self._input(rest[0])
         elif kind in ("cos", "sin") and self._turns(rest[0]):
             turn = self._language.turn
             assert turn is not None
@@ -143,8 +143,6 @@ class _Writer:
                 declared = self._language.declared[0]
                 self.lines.append(declared.format(name, self._language.at("x", place)))
             return name
-        if place < STATES:
-            return self._language.at("x", place)
         return self._language.at("x", place)
 
     def _row(self, rest: list[int]) -> str:

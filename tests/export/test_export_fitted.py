@@ -76,7 +76,7 @@ def test_vrxs_plugin_only_brakes(job, tmp_path):
     assert -(p["xU"] + p["xUU"] * 0.35) * 0.35 == pytest.approx(x, rel=0.3)
 
 
-@pytest.mark.parametrize("to", ["gazebo", "vrx", "pvs"])
+@pytest.mark.parametrize("to", ["gazebo", "vrx", pytest.param("pvs", marks=pytest.mark.long)])
 def test_what_nothing_loads_says_so_in_its_file(whole, tmp_path, to):
     out, said = tmp_path / "ship.txt", tmp_path / "said.json"
     code, text, _ = call("export", whole, "--to", to, "--out", out, "--json", said)
@@ -85,6 +85,7 @@ def test_what_nothing_loads_says_so_in_its_file(whole, tmp_path, to):
     assert "Not loaded by its consumer" in out.read_text() and len(answer["not_in_it"]) >= 3
 
 
+@pytest.mark.long
 def test_a_vehicle_comes_to_simulate_as_the_sample_time_falls(job, tmp_path):
     """The simulator's own Euler steps of place and heading are of the first order."""
     path = tmp_path / "vehicle.py"
@@ -147,6 +148,7 @@ def test_shipmmgs_polynomial_has_a_hull_of_its_own_form(job, monkeypatch):
     assert min(found.explained) > 1.0 - 1e-9
 
 
+@pytest.mark.long
 def test_equations_of_a_hybrid_are_its_own(tmp_path):
     """Network, fade and azimuths: the numpy that is written against JAX."""
     import jax.numpy as jnp

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from commands import call
 
-from shiplog.export import fmu, mss, trial
+from shiplog.export import fmu, mss, python_file, trial
 from shiplog.export.job import Job
 from shiplog.training.runs import load_model
 
@@ -28,8 +28,17 @@ def exported(run, to, out, *more):
     return answer
 
 
-@pytest.mark.parametrize("run", ["whole", "steered"])
-@pytest.mark.parametrize("to", ["cpp", "python", "mss", "fmu", "fmu3"])
+LONG = pytest.mark.long
+
+
+@pytest.mark.parametrize(
+    ("run", "to"),
+    [
+        *(("steered", to) for to in ("cpp", "python", "fmu", "fmu3")),
+        pytest.param("steered", "mss", marks=LONG),
+        *(pytest.param("whole", to, marks=LONG) for to in ("cpp", "python", "mss", "fmu", "fmu3")),
+    ],
+)
 def test_it_sails_as_simulate_does(request, run, to, tmp_path):
     """With gear, load and current, and without; the published model by Heun's method."""
     folder = request.getfixturevalue(run)
@@ -37,6 +46,9 @@ def test_it_sails_as_simulate_does(request, run, to, tmp_path):
     answer = exported(folder, to, tmp_path / f"ship.{ending}")
     assert answer["greatest_difference"] < SAME and answer["seconds"] == 600.0
     assert set(answer["differences"]) == {"x0", "y0", "heading", "surge", "sway", "yaw_rate"}
+    if to == "cpp":  # what was compared is in the file
+        kept = (tmp_path / "ship.h").read_text()
+        assert "Sailed again by gcc" in kept and "from shiplog simulate over 600 s" in kept
 
 
 def test_the_trial_moves_all_that_drives_the_ship(whole):
@@ -58,13 +70,7 @@ def test_a_difference_is_seen(whole):
     assert not found.same and found.by_channel["sway"] == pytest.approx(2e-9)
 
 
-def test_the_record_is_in_the_file(whole, tmp_path):
-    out = tmp_path / "ship.h"
-    exported(whole, "cpp", out)
-    assert "Sailed again by gcc" in out.read_text()
-    assert "greatest difference from shiplog simulate over 600 s" in out.read_text()
-
-
+@pytest.mark.long
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
 def test_a_header_is_c99_and_cpp11_without_a_warning(whole, tmp_path):
     from shiplog.export import compilers
@@ -82,7 +88,7 @@ def test_a_header_is_c99_and_cpp11_without_a_warning(whole, tmp_path):
 
 def test_a_python_file_sails_members_and_other_coefficients(whole, tmp_path):
     out = tmp_path / "ship.py"
-    exported(whole, "python", out)
+    python_file.write(Job(load_model.load(whole)), out, [])
     known = {}
     exec(out.read_text(), known)
     many = known["Ship"](surge=np.array([0.3, 0.4, 0.5]))
@@ -99,6 +105,7 @@ def test_a_python_file_sails_members_and_other_coefficients(whole, tmp_path):
         known["Ship"](coefficients={"body.other": 1.0})
 
 
+@pytest.mark.long
 @pytest.mark.skipif(mss.octave() is None, reason="Octave is not installed")
 def test_the_derivative_of_mss_is_over_ground(whole, tmp_path):
     """In a current it is that of still water, of the motion through it, and what the turning of
@@ -135,10 +142,10 @@ def test_what_is_refused(whole, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_an_fmu_names_no_place_and_no_host(whole, tmp_path):
+def test_an_fmu_names_no_place_and_no_host(steered, tmp_path):
     """The same run gives the same bytes, and none of them is of this machine."""
     out, again = tmp_path / "one.fmu", tmp_path / "two.fmu"
-    job = Job(load_model.load(whole))
+    job = Job(load_model.load(steered))
     for path in (out, again):
         fmu.write(job, path, [])
     assert out.read_bytes() == again.read_bytes()
@@ -147,7 +154,7 @@ def test_an_fmu_names_no_place_and_no_host(whole, tmp_path):
         assert {"modelDescription.xml", "sources/fmi2.c", "sources/ship.h"} <= set(names)
         for name in names:
             data = archive.read(name)
-            for word in (b"/tmp", b"/home", b"/root", b"/work", b"http://", str(whole).encode()):
+            for word in (b"/tmp", b"/home", b"/root", b"/work", b"http://", str(steered).encode()):
                 assert word not in data, (name, word)
             for host in data.split(b"https://")[1:]:
                 assert host.startswith(b"open-simulation-platform.com/OspModelDescription"), name

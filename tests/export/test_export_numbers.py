@@ -49,7 +49,7 @@ def test_a_yaml_is_read_with_its_numbers(whole, tmp_path):
         assert yaml.safe_load(_value(number)) == number
 
 
-@pytest.mark.parametrize("to", ["mcap", "parquet", "csv"])
+@pytest.mark.parametrize("to", [pytest.param("mcap", marks=pytest.mark.long), "parquet", "csv"])
 def test_predictions_are_those_of_evaluate(whole, sailed, tmp_path, to):
     out, store = tmp_path / f"p.{to}", sailed / "store"
     code, text, said = call("export", whole, "--to", to, "--out", out, "--store", store,
