@@ -34,8 +34,8 @@ LONG = pytest.mark.long
 @pytest.mark.parametrize(
     ("run", "to"),
     [
-        *(("steered", to) for to in ("cpp", "python", "fmu", "fmu3")),
-        pytest.param("steered", "mss", marks=LONG),
+        *(("steered", to) for to in ("cpp", "fmu", "fmu3")),
+        *(pytest.param("steered", to, marks=LONG) for to in ("python", "mss")),
         *(pytest.param("whole", to, marks=LONG) for to in ("cpp", "python", "mss", "fmu", "fmu3")),
     ],
 )
