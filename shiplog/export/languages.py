@@ -86,7 +86,7 @@ PYTHON = Language(
 OCTAVE = Language(
     _COMMON | {
         "mul": "({0} * {1})", "div": "({0} / {1})", "ne": "({0} ~= {1})",
-        "abs": "abs({0})", "max": "larger({0}, {1})", "min": "-larger(-{0}, -{1})",
+        "abs": "abs({0})", "max": "larger({0}, {1})", "min": "smaller({0}, {1})",
         "round": "nearest({0})", "copysign": "signed({0}, {1})", "exp2": "(2 ^ {0})",
         "pow": "real_power({0}, {1})", "and": "({0} && {1})", "or": "({0} || {1})",
         "xor": "xor({0}, {1})", "not": "(~{0})", "finite": "isfinite({0})",
