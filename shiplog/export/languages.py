@@ -88,7 +88,10 @@ OCTAVE = Language(
         "mul": "({0} * {1})", "div": "({0} / {1})", "ne": "({0} ~= {1})",
         "abs": "abs({0})", "max": "larger({0}, {1})", "min": "smaller({0}, {1})",
         "round": "nearest({0})", "copysign": "signed({0}, {1})", "exp2": "(2 ^ {0})",
-        "pow": "real_power({0}, {1})", "and": "({0} && {1})", "or": "({0} || {1})",
+        # outside their domain Octave's are complex, and here there is no number
+        "pow": "real_only({0} ^ {1})", "sqrt": "real_only(sqrt({0}))", "log": "real_only(log({0}))",
+        "log1p": "real_only(log1p({0}))", "asin": "real_only(asin({0}))", "acos": "real_only(acos({0}))",
+        "and": "({0} && {1})", "or": "({0} || {1})",
         "xor": "xor({0}, {1})", "not": "(~{0})", "finite": "isfinite({0})",
         "select": "chosen({0}, {1}, {2})",
     },
