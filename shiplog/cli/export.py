@@ -11,7 +11,7 @@ from shiplog.cli import completion
 from shiplog.cli.inputs import check_voyages
 from shiplog.cli.options import STORE, Causes, JsonOption, StoreOption, TestVoyages
 from shiplog.cli.output import LOST, answer
-from shiplog.export.targets import PREDICTIONS, TARGETS, of_name
+from shiplog.export.targets import PREDICTIONS, TARGETS, of_name, refuse_voyages
 
 
 def export(
@@ -44,6 +44,8 @@ def export(
     Example: shiplog export runs/mmg --to fmu --out ship.fmu
     """  # fmt: skip
     target = of_name(to)
+    if voyages:
+        refuse_voyages(to)
     from shiplog.machine.paths import check_causes, check_file, check_run
 
     check_run(run)

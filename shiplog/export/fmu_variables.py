@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 
 from shiplog.export.ship import Ship
@@ -19,6 +20,7 @@ UNITS: dict[str, dict[str, str]] = {
 }  # fmt: skip
 RATES = {"rad": "rad/s", "rev/s": "rev/s2", "1": "1/s"}
 ACCELERATIONS = (("surge", "m/s2"), ("sway", "m/s2"), ("yaw", "rad/s2"))
+NO_LIMITS = (-math.inf, math.inf)
 INPUT, OUTPUT, FIXED, TUNABLE, TIME = "input", "output", "fixed", "tunable", "independent"
 
 
@@ -43,7 +45,7 @@ def of_ship(ship: Ship) -> list[Variable]:
     state = [(c.name, c.unit, value) for c, value in zip(STATE, _start(ship), strict=True)]
     found = [
         Variable(f"order.{i.name}", f"ordered position of the {i.kind} {i.name}", INPUT, i.unit,
-                 i.approach, i.low, i.high)
+                 i.approach, *((i.low, i.high) if i.low <= i.approach <= i.high else NO_LIMITS))
         for i in ship.inputs
     ]  # fmt: skip
     for what, about in (("wind", "true wind, where it comes from"), ("current", "where it sets")):
@@ -75,7 +77,7 @@ def of_ship(ship: Ship) -> list[Variable]:
         for i in ship.inputs
     ]  # fmt: skip
     found += [
-        Variable(f"coefficient.{n.name}", n.meaning, TUNABLE, n.unit if n.unit in UNITS else "",
+        Variable(_structured(n.name), n.meaning, TUNABLE, n.unit if n.unit in UNITS else "",
                  n.value)
         for n in ship.numbers
     ]  # fmt: skip
@@ -86,6 +88,13 @@ def of_ship(ship: Ship) -> list[Variable]:
         ),
         Variable("diverged", "it is where no ship goes", OUTPUT),
     ]
+
+
+def _structured(name: str) -> str:
+    """Of a coefficient, by FMI's structured convention: words that begin with a letter. A cause's
+    numbers are `current.0`, and its label may have a colon."""
+    found = re.sub(r"[^\w.]", "_", name, flags=re.ASCII)
+    return "coefficient." + re.sub(r"\.(?=\d)", "_", found)
 
 
 def _start(ship: Ship) -> list[float]:

@@ -90,7 +90,8 @@ OCTAVE = Language(
         "round": "nearest({0})", "copysign": "signed({0}, {1})", "exp2": "(2 ^ {0})",
         # outside their domain Octave's are complex, and here there is no number
         "pow": "real_only({0} ^ {1})", "sqrt": "real_only(sqrt({0}))", "log": "real_only(log({0}))",
-        "log1p": "real_only(log1p({0}))", "asin": "real_only(asin({0}))", "acos": "real_only(acos({0}))",
+        "log1p": "real_only(log1p({0}))", "asin": "real_only(asin({0}))",
+        "acos": "real_only(acos({0}))",
         "and": "({0} && {1})", "or": "({0} || {1})",
         "xor": "xor({0}, {1})", "not": "(~{0})", "finite": "isfinite({0})",
         "select": "chosen({0}, {1}, {2})",

@@ -135,7 +135,9 @@ def _numbers(run: Run, names: tuple[str, ...], theta: np.ndarray) -> tuple[Numbe
     for name, value in zip(names, theta.tolist(), strict=True):
         one = known.get(name)
         if one is None:  # a cause's number, or a weight of a hybrid's network
-            found.append(Number(name, value, "", "SI"))
+            of, _, place = name.rpartition(".")
+            what = f"number {place} of {of}, SI" if place.isdigit() else "a weight of the network"
+            found.append(Number(name, value, "", what))
         else:
             words = ", ".join(filter(None, (one.symbol, one.meaning)))
             found.append(Number(name, value, one.unit, words, one.low, one.high))

@@ -37,6 +37,11 @@ class Target:
     exact: bool = True
 
     @property
+    def of_voyages(self) -> bool:
+        """Whether it can be what a run predicts of voyages."""
+        return self.kind == PREDICTIONS or self.module == "csv_file"
+
+    @property
     def maker(self) -> Any:
         return import_module(f"shiplog.export.{self.module}")
 
@@ -58,6 +63,15 @@ TARGETS = {
     "toml": Target("the coefficients, for train --parameters", ".toml", "toml_file", NUMBERS),
     "yaml": Target("the coefficients", ".yaml", "yaml_file", NUMBERS),
 }
+
+
+def refuse_voyages(name: str) -> None:
+    """Raises UsageError for voyages of a target that predicts nothing."""
+    if not of_name(name).of_voyages:
+        raise UsageError(
+            f"--to {name} is of the model, and no voyage is part of it.",
+            hint="leave --voyages out; --to mcap, parquet and csv are of voyages.",
+        )
 
 
 def of_name(name: str) -> Target:

@@ -9,7 +9,7 @@ import pytest
 from shiplog.export import compilers, mss, statements
 from shiplog.export.equations import LEAST_PRODUCT, Equations, of_model
 from shiplog.export.filled import replaced
-from shiplog.export.languages import C, OCTAVE, PYTHON
+from shiplog.export.languages import OCTAVE, PYTHON, C
 from shiplog.machine.jit_cache import double
 
 MATRIX = np.random.default_rng(0).normal(size=(40, 30))
@@ -35,7 +35,7 @@ HARD = [
 
 
 class Everything:
-    """ν̇ of functions that a cause of the user's own may have, by two arguments and a coefficient."""
+    """ν̇ of functions that a cause of the user's own may have, by two arguments and a number."""
 
     def acceleration(self, theta, state, actuator, wind):
         x, y = state[1], state[3]

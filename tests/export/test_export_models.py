@@ -1,6 +1,7 @@
 """Models in other programs' files: each sails the schedule that `simulate` sails."""
 
 import json
+import re
 import shutil
 import zipfile
 
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 from commands import call
 
-from shiplog.export import fmu, mss, python_file, trial
+from shiplog.export import fmu, fmu_variables, mss, python_file, trial
 from shiplog.export.job import Job
 from shiplog.training.runs import load_model
 
@@ -139,7 +140,17 @@ def test_what_is_refused(whole, tmp_path):
     assert code == 2 and "my ship" in said and "whole.m" in said
     code, _, said = call("export", whole, "--to", "cpp", "--out", tmp_path / "no" / "a.h")
     assert code == 1 and "no folder" in said
+    code, _, said = call("export", whole, "--to", "cpp", "--voyages", "voyage_1")
+    assert code == 2 and "no voyage is part of it" in said
     assert not list(tmp_path.iterdir())
+
+
+def test_names_are_structured_as_fmi_has_them(steered):
+    """Words of letters, digits and _, which begin with a letter, with points between."""
+    names = [one.name for one in fmu_variables.of_ship(Job(load_model.load(steered)).ship)]
+    assert "coefficient.rudder_lag_0" in names and "coefficient.hull.y_v" in names
+    assert len(set(names)) == len(names)
+    assert all(re.fullmatch(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", name) for name in names)
 
 
 def test_an_fmu_names_no_place_and_no_host(steered, tmp_path):
