@@ -122,9 +122,8 @@ HOUSE = (  # package, what it holds; from below, which is what is imported by al
     (("models", "mmg, networks, causes"), ("simulation", "rollouts, L, coverage"),
      ("training", "recipes, runs")),
     (("diagnosis", "segments to verdict"), ("manoeuvres", "found, measured, sailed"),
-     ("planning", "what to sail next"), ("report", "page, figures, viewer"),
-     ("export", "other programs' files")),
-    (("commands", "steps of each command"), ("cli", "arguments, printing")),
+     ("planning", "what to sail next"), ("report", "page, figures, viewer")),
+    (("export", "other programs' files"), ("commands", "steps of each command"), ("cli", "arguments, printing")),
 )  # fmt: skip
 
 
