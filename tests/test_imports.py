@@ -49,6 +49,7 @@ ONLY = {  # a library, and the packages and modules that may import it
     "rosbags": {"logs"}, "rerun": {"logs", "report", "export"}, "ray": {"training"},
     "matplotlib": {"report"}, "jinja2": {"report"}, "typer": {"cli"}, "pickle": set(),
     "torch": {"training", "shiplog.models.feedforward"}, "pymavlink": {"logs"},
+    "fmpy": {"export", "foreign"}, "onnx": {"export"}, "onnxruntime": {"export"},
 }  # fmt: skip
 
 

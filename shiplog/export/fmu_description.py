@@ -27,7 +27,7 @@ CAN_3 = {
 
 def fmi2(ship: Ship, variables: Sequence[Variable], token: str, about: str) -> str:
     root = xml.Element("fmiModelDescription", {
-        "fmiVersion": "2.0", "modelName": ship.run, "guid": token, "description": about,
+        "fmiVersion": "2.0", "modelName": plain(ship.run), "guid": token, "description": about,
         "generationTool": ship.author, "variableNamingConvention": "structured",
     })  # fmt: skip
     kind = xml.SubElement(root, "CoSimulation", {"modelIdentifier": ship.identifier, **CAN_2})
@@ -60,7 +60,7 @@ def fmi2(ship: Ship, variables: Sequence[Variable], token: str, about: str) -> s
 
 def fmi3(ship: Ship, variables: Sequence[Variable], token: str, about: str) -> str:
     root = xml.Element("fmiModelDescription", {
-        "fmiVersion": "3.0", "modelName": ship.run, "instantiationToken": token,
+        "fmiVersion": "3.0", "modelName": plain(ship.run), "instantiationToken": token,
         "description": about, "generationTool": ship.author,
         "variableNamingConvention": "structured",
     })  # fmt: skip
@@ -115,6 +115,11 @@ def osp(ship: Ship, variables: Sequence[Variable]) -> str:
             group = xml.SubElement(groups, "Generic", {"name": f"{what}_{one.name}"})
             xml.SubElement(group, "Variable", {"ref": f"{what}.{one.name}", **_unit(one.unit)})
     return _text(root)
+
+
+def plain(text: str) -> str:
+    """Without what XML 1.0 cannot hold, and on one line."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text)
 
 
 def _group(parent: xml.Element, kind: str, name: str, refs: Sequence[str], unit: str) -> None:

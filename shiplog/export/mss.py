@@ -23,6 +23,10 @@ from shiplog.machine import files
 
 CONSUMER = "Octave"
 LONGEST_NAME = 63  # letters, of MATLAB
+KEYWORDS = frozenset({
+    "break", "case", "catch", "classdef", "continue", "else", "elseif", "end", "for", "function",
+    "global", "if", "otherwise", "parfor", "persistent", "return", "spmd", "switch", "try", "while",
+})  # fmt: skip
 DRIVE = """
 f = fopen('given.bin'); given = fread(f, Inf, 'double'); fclose(f);
 start = given(1:6); wind = given(7:8); current = given(9:10); count = given(11);
@@ -39,7 +43,8 @@ f = fopen('found.bin', 'w'); fwrite(f, out, 'double'); fclose(f);
 
 def write(job: Job, path: Path, record: Sequence[str]) -> None:
     """Raises UsageError for a file's name that no function can have."""
-    if not re.fullmatch(r"[A-Za-z]\w*", path.stem, re.ASCII) or len(path.stem) > LONGEST_NAME:
+    good = re.fullmatch(r"[A-Za-z]\w*", path.stem, re.ASCII) and path.stem not in KEYWORDS
+    if not good or len(path.stem) > LONGEST_NAME:
         raise UsageError(
             f"A function of MATLAB cannot be called {path.stem!r}, and its file has its name.",
             hint=f"give --out a name of letters, digits and _, such as {job.ship.identifier}.m.",

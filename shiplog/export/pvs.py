@@ -6,6 +6,7 @@ attitude itself: η ← η + h J(η) ν of the new ν. `driven` does as that loo
 
 from __future__ import annotations
 
+import keyword
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -29,12 +30,18 @@ def write(job: Job, path: Path, record: Sequence[str]) -> None:
 
 def text(ship: Ship, steering: np.ndarray, record: Sequence[str]) -> str:
     vehicle = filled("vehicle_py.txt", {
-        "CLASS": ship.identifier, "SHIP": inert(ship.ship).replace('"', "'"),
+        "CLASS": vehicle_name(ship), "SHIP": inert(ship.ship).replace('"', "'"),
         "RUN": inert(ship.run), "LENGTH": repr(ship.length), "SPEED": repr(ship.speed),
         "CONTROLS": ", ".join(f'"{i.name} ({i.unit})"' for i in ship.inputs),
         "STEERS": "".join(f"{float(one)!r}, " for one in steering).rstrip(" "),
     })  # fmt: skip
     return python_file.text(ship, record) + vehicle
+
+
+def vehicle_name(ship: Ship) -> str:
+    """Of its class: the run's name, unless that is a word of Python or of the file."""
+    name = ship.identifier
+    return f"{name}_vehicle" if keyword.iskeyword(name) or name[0].isupper() else name
 
 
 def losses(job: Job) -> tuple[str, ...]:
@@ -64,7 +71,7 @@ def driven(ship: Ship, trial: Trial, path: Path, sample: float) -> np.ndarray:
     known: dict = {"__name__": ship.identifier}
     exec(compile(path.read_text("utf-8"), path.name, "exec"), known)
     wind, current = trial.water.wind, trial.water.current
-    vehicle = known[ship.identifier](
+    vehicle = known[vehicle_name(ship)](
         V_current=float(np.hypot(*current)),
         beta_current=float(np.degrees(np.arctan2(current[1], current[0]))), wind=wind,
     )  # fmt: skip

@@ -4,12 +4,25 @@ import json
 import re
 import shutil
 import zipfile
+from dataclasses import replace
+from xml.etree import ElementTree as xml
 
 import numpy as np
 import pytest
 from commands import call
 
-from shiplog.export import fmu, fmu_variables, mss, python_file, trial
+from shiplog.export import (
+    c_source,
+    compilers,
+    fmu,
+    fmu_description,
+    fmu_variables,
+    mss,
+    pvs,
+    python_file,
+    trial,
+)
+from shiplog.export.filled import inert
 from shiplog.export.job import Job
 from shiplog.training.runs import load_model
 
@@ -143,6 +156,38 @@ def test_what_is_refused(whole, tmp_path):
     code, _, said = call("export", whole, "--to", "cpp", "--voyages", "voyage_1")
     assert code == 2 and "no voyage is part of it" in said
     assert not list(tmp_path.iterdir())
+
+
+def test_a_model_that_is_not_the_same_ends_with_3(whole, tmp_path, monkeypatch):
+    apart = trial.Difference({"x0": 2e-9}, 600.0)
+    monkeypatch.setattr(python_file, "compare", lambda *_: apart)
+    code, text, _ = call("export", whole, "--to", "python", "--out", tmp_path / "ship.py")
+    assert code == 3 and "not the same model" in text and "x0 2e-09 m" in text
+
+
+def test_texts_of_strangers_end_no_comment(steered):
+    """Names of a ship and a run, in every language."""
+    evil = 'a*/ """ \\ @NAME@ <b>\n#error \'x\' %} \u2028'
+    ship = replace(Job(load_model.load(steered)).ship, ship=evil, run=evil, label=evil)
+    assert re.fullmatch(r"[A-Za-z]\w*", ship.identifier, re.ASCII)
+    compile(pvs.text(ship, np.ones(3), [evil]), "ship.py", "exec")
+    for line in mss.text(ship, "vessel", [evil]).splitlines():
+        assert "#error" not in line and "@" not in line.replace("@ (", "")
+    header = c_source.header(ship, [evil])
+    assert "#error" not in header and header.count("/*") == header.count("*/")
+    described = fmu_description.fmi2(ship, fmu_variables.of_ship(ship), "{1}", inert(evil))
+    assert xml.fromstring(described).get("modelName") == evil.replace("\n", "?")
+
+
+def test_without_a_compiler_it_holds_the_sources(steered, tmp_path, monkeypatch):
+    monkeypatch.setattr(compilers, "own", lambda: None)
+    monkeypatch.setattr(compilers, "zig", lambda: None)
+    monkeypatch.setattr(fmu, "_compiled", {})
+    code, text, _ = call("export", steered, "--to", "fmu", "--out", tmp_path / "ship.fmu")
+    assert code == 0 and "sources alone" in text and "Not loaded by its consumer" in text
+    with zipfile.ZipFile(tmp_path / "ship.fmu") as archive:
+        assert not [name for name in archive.namelist() if name.startswith("binaries/")]
+        assert "sources/fmi2.c" in archive.namelist()
 
 
 def test_names_are_structured_as_fmi_has_them(steered):
