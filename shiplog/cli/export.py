@@ -9,7 +9,7 @@ import typer
 
 from shiplog.cli import completion
 from shiplog.cli.inputs import check_voyages
-from shiplog.cli.options import STORE, Causes, JsonOption, StoreOption, TestVoyages
+from shiplog.cli.options import CHOSEN, STORE, Causes, JsonOption, StoreOption
 from shiplog.cli.output import LOST, answer
 from shiplog.export.targets import PREDICTIONS, TARGETS, of_name, refuse_voyages
 
@@ -27,7 +27,15 @@ def export(
             autocompletion=completion.of_words(tuple(TARGETS)),
         ),
     ],
-    voyages: TestVoyages = None,
+    voyages: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--voyages",
+            help=f"Of mcap, parquet and csv. {CHOSEN} the run's test voyages; csv then has "
+            "coefficients.",
+            autocompletion=completion.voyages,
+        ),
+    ] = None,
     store: StoreOption = STORE,
     out: Annotated[
         Path | None,

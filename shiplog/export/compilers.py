@@ -14,7 +14,7 @@ from pathlib import Path
 
 from shiplog.exceptions import ShiplogError
 
-OPTIONS = ("-std=c99", "-O2", "-fPIC", "-ffp-contract=off", "-fvisibility=hidden")
+OPTIONS = ("-std=c99", "-O2", "-g0", "-fPIC", "-ffp-contract=off", "-fvisibility=hidden")
 PATIENCE = 300.0  # s: a network of a thousand units compiles in ten
 FIRST_PATIENCE = 1200.0  # s: the first time ziglang compiles a system's C library as well
 LAST = 400  # letters of a compiler's complaint

@@ -149,7 +149,12 @@ def _library(
             (folder / name).write_text(text, encoding="utf-8")
         out = folder / "binary" / f"{ship.identifier}{system.ending}"
         compilers.shared(command, folder / f"fmi{version}.c", out, system)
-        library = out.read_bytes()
+        library, place = out.read_bytes(), str(folder).encode()
+    if place in library:  # a debugger's note; a library goes to others
+        raise ShiplogError(
+            f"The library for {system.fmi3} names a folder of this machine.",
+            hint="report it with the version of the compiler.",
+        )
     missing = [name for name in functions(version) if name.encode() not in library]
     if missing:
         raise ShiplogError(
@@ -206,7 +211,7 @@ def sail(ship: Ship, trial: Trial, path: Path) -> np.ndarray:
         if not any((binary / name).is_dir() for name in here()):
             raise NotLoaded("no C compiler is on this machine, so it holds sources alone")
         assert description.coSimulation is not None
-        make = FMU2Slave if description.fmiVersion.startswith("2") else FMU3Slave
+        make = FMU2Slave if str(description.fmiVersion).startswith("2") else FMU3Slave
         fmu = make(
             guid=description.guid, unzipDirectory=str(folder), instanceName="trial",
             modelIdentifier=description.coSimulation.modelIdentifier,
@@ -217,7 +222,7 @@ def sail(ship: Ship, trial: Trial, path: Path) -> np.ndarray:
 def _sailed(fmu: Any, description: Any, ship: Ship, trial: Trial) -> np.ndarray:
     """Of an FMPy slave of FMI 2 or 3, freed at the end."""
     places = {v.name: v.valueReference for v in description.modelVariables}
-    three = description.fmiVersion.startswith("3")
+    three = str(description.fmiVersion).startswith("3")
     put, get = (fmu.setFloat64, fmu.getFloat64) if three else (fmu.setReal, fmu.getReal)
     fmu.instantiate()
     try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from shiplog.export import numbers_of_run
 from shiplog.export.filled import inert
@@ -37,8 +38,8 @@ def compare(job: Job, path: Path) -> Difference:
         import yaml
     except ImportError as error:
         raise NotLoaded("PyYAML is not installed (pip install 'shiplog[export]')") from error
-    read = yaml.safe_load(path.read_text("utf-8"))["coefficients"]
-    values = {name: one["value"] for name, one in read.items()}
+    read: Any = yaml.safe_load(path.read_text("utf-8"))
+    values = {name: one["value"] for name, one in read["coefficients"].items()}
     return numbers_of_run.apart(numbers_of_run.frame(job), values)
 
 
