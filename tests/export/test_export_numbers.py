@@ -1,6 +1,8 @@
 """Coefficients and predictions in files, read again by other programs."""
 
 import json
+import subprocess
+import sys
 import tomllib
 
 import numpy as np
@@ -68,6 +70,8 @@ def test_predictions_are_those_of_evaluate(whole, sailed, tmp_path, to):
                 found.setdefault(channel.topic, []).append((message.log_time, decoded))
         assert {"/sim/whole/state", "/ship/state", "/wind/apparent", "/propeller/propeller"} <= \
             set(found)  # fmt: skip
+        words = [sys.executable, "-m", "rerun", "mcap", "check", out]
+        assert subprocess.run(words, capture_output=True, check=False).returncode == 0
         surge = [m.surge_mps for _, m in found["/sim/whole/state"]]
         stamps = [t for t, _ in found["/ship/state"]]
         assert stamps == sorted(stamps) and len(surge) == len(stamps)
