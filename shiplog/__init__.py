@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         diagnose,
         diagnose_list,
         evaluate,
+        export_run,
         find_manoeuvres,
         gate,
         ingest,
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from shiplog.commands.prepare import Ingested
     from shiplog.commands.sensors import SensorComparison
     from shiplog.exceptions import ShiplogError
+    from shiplog.export.exported import Exported
     from shiplog.report.diagnosis.diagnosis import Diagnosis
     from shiplog.report.evaluation.evaluation import Evaluation
     from shiplog.report.fleet.fleet import Fleet
@@ -58,6 +60,7 @@ __all__ = [
     "Diagnosis",
     "Draft",
     "Evaluation",
+    "Exported",
     "Fleet",
     "Gate",
     "Ingested",
@@ -76,6 +79,7 @@ __all__ = [
     "diagnose",
     "diagnose_list",
     "evaluate",
+    "export_run",
     "find_manoeuvres",
     "gate",
     "ingest",
@@ -95,6 +99,7 @@ _CLASSES = {
     "Diagnosis": "report.diagnosis.diagnosis",
     "Draft": "commands.convert",
     "Evaluation": "report.evaluation.evaluation",
+    "Exported": "export.exported",
     "Fleet": "report.fleet.fleet",
     "Gate": "commands.gate",
     "Ingested": "commands.prepare",

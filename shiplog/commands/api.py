@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from shiplog.commands.gate import Gate
     from shiplog.commands.prepare import Ingested
     from shiplog.commands.sensors import SensorComparison
+    from shiplog.export.exported import Exported
     from shiplog.report.diagnosis.diagnosis import Diagnosis
     from shiplog.report.evaluation.evaluation import Evaluation
     from shiplog.report.fleet.fleet import Fleet
@@ -369,6 +370,36 @@ def simulate(
         opened, manoeuvre, speed=speed, water=water, members=members, seed=seed, seconds=seconds,
         out=to,
     )  # fmt: skip
+
+
+def export_run(
+    run: AnyRun,
+    to: str,
+    out: str | Path | None = None,
+    store: AnyStore | None = None,
+    *,
+    voyages: Names = (),
+    causes: Files = (),
+) -> Exported:
+    """A run in a file of another program, loaded again by that program and compared.
+
+    to       one of `shiplog.export.targets.TARGETS`
+    out      the file; the run's name here unless given
+    store    of the voyages whose predictions are wanted, with `voyages`
+
+    Raises ShiplogError.
+    """
+    from shiplog.commands import export as exporting
+    from shiplog.commands import simulate as simulating
+    from shiplog.export import targets
+    from shiplog.machine.paths import check_file
+
+    target = targets.of_name(to)
+    (path,) = _runs(run)
+    opened = simulating.load(path, _files(causes))
+    file = check_file(Path(out or f"{opened.name}{target.ending}"), "out")
+    of = None if store is None else Store(_path(store))
+    return exporting.export_run(opened, to, file, of, _names(voyages))
 
 
 def plan(

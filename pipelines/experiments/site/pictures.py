@@ -123,7 +123,7 @@ HOUSE = (  # package, what it holds; from below, which is what is imported by al
      ("training", "recipes, runs")),
     (("diagnosis", "segments to verdict"), ("manoeuvres", "found, measured, sailed"),
      ("planning", "what to sail next"), ("report", "page, figures, viewer")),
-    (("commands", "steps of each command"), ("cli", "arguments, printing")),
+    (("export", "other programs' files"), ("commands", "steps of each command"), ("cli", "arguments, printing")),
 )  # fmt: skip
 
 

@@ -26,10 +26,10 @@ MOST_NODES = 10_000
 
 
 class Reader:
-    """Reads jaxprs into one graph."""
+    """Reads jaxprs into one graph of `most` nodes at most."""
 
-    def __init__(self, graph: Graph) -> None:
-        self.graph = graph
+    def __init__(self, graph: Graph, most: int = MOST_NODES) -> None:
+        self.graph, self.most = graph, most
 
     def read(self, closed: Any, arguments: Sequence[Nodes]) -> list[Nodes]:
         """Outputs of a closed jaxpr, of nodes for its inputs."""
@@ -60,8 +60,8 @@ class Reader:
 
         for equation in jaxpr.eqns:
             found = self._equation(equation, [of(v) for v in equation.invars])
-            if len(self.graph.nodes) > MOST_NODES:
-                raise UnknownOperation(f"more than {MOST_NODES} operations")
+            if len(self.graph.nodes) > self.most:
+                raise UnknownOperation(f"more than {self.most} operations")
             known.update(zip(equation.outvars, found, strict=True))
         return [of(v) for v in jaxpr.outvars]
 
@@ -91,6 +91,13 @@ class Reader:
         flat = [np.broadcast_to(nodes, shape).ravel().tolist() for nodes in given]
         found = [function(self.graph, *nodes) for nodes in zip(*flat, strict=True)]
         return np.array(found, dtype=np.int64).reshape(shape)
+
+    def product(self, left: Nodes, right: Nodes) -> Nodes:
+        """left [m, k] · right [n, k]ᵀ: [m, n]."""
+        if left.shape[0] * right.shape[0] * left.shape[1] > self.most:
+            raise UnknownOperation(f"more than {self.most} operations")
+        each = self.elementwise(lambda g, x, y: g.mul(x, y), left[:, None], right[None])
+        return self.reduced("add", each, (2,))
 
     def reduced(self, kind: str, nodes: Nodes, axes: Sequence[int]) -> Nodes:
         kept = [axis for axis in range(nodes.ndim) if axis not in axes]
@@ -342,11 +349,8 @@ def _product(r: Reader, params: Any, a: Nodes, b: Nodes) -> Nodes:
     rest_b = [i for i in range(b.ndim) if i not in of_b]
     left = np.transpose(a, [*rest_a, *of_a]).reshape(-1, math.prod(a.shape[i] for i in of_a))
     right = np.transpose(b, [*rest_b, *of_b]).reshape(-1, left.shape[1])
-    if left.shape[0] * right.shape[0] * left.shape[1] > MOST_NODES:
-        raise UnknownOperation(f"more than {MOST_NODES} operations")
-    product = r.elementwise(lambda g, x, y: g.mul(x, y), left[:, None], right[None])
     shape = [a.shape[i] for i in rest_a] + [b.shape[i] for i in rest_b]
-    return r.reduced("add", product, (2,)).reshape(shape)
+    return r.product(left, right).reshape(shape)
 
 
 STRUCTURAL: dict[str, Callable[..., Any]] = {

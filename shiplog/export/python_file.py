@@ -1,0 +1,91 @@
+"""`--to python`: one file of numpy, without shiplog."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from shiplog.export import statements
+from shiplog.export.filled import filled, inert
+from shiplog.export.job import Job
+from shiplog.export.languages import PYTHON
+from shiplog.export.ship import Ship
+from shiplog.export.trial import Difference, Trial, difference
+from shiplog.machine import files
+
+CONSUMER = "numpy"
+
+
+def write(job: Job, path: Path, record: Sequence[str]) -> None:
+    files.write_text(path, text(job.ship, record))
+
+
+def losses(job: Job) -> tuple[str, ...]:
+    return job.ship.losses
+
+
+def compare(job: Job, path: Path) -> Difference:
+    return difference(job.trial, sail(job.ship, job.trial, path))
+
+
+def text(ship: Ship, record: Sequence[str]) -> str:
+    made = statements.written(ship.equations, PYTHON, _product)
+    inputs = ship.inputs
+    return filled("ship_py.txt", {
+        "SHIP": inert(ship.ship), "RUN": inert(ship.run), "LABEL": inert(ship.label),
+        "AUTHOR": ship.author, "RECORD": "\n".join(inert(line) for line in record),
+        "METHOD": "Heun's method" if ship.heun else "Euler's method",
+        "UNITS": ", ".join(f"{i.unit} ({i.name})" for i in inputs),
+        "SPEED": f"{ship.speed:.6g}", "FIRST": inputs[0].name, "STEP": repr(ship.step),
+        "ACTUATORS": _tuple(repr(i.name) for i in inputs),
+        "APPROACH": _tuple(repr(i.approach) for i in inputs),
+        "RATE": _tuple(repr(i.rate) for i in inputs),
+        "OFFSET": _tuple(repr(i.offset) for i in inputs),
+        "GEARED": _tuple(repr(i.geared) for i in inputs),
+        "LAG": repr(ship.lag), "DELAY": repr(ship.delay), "HEUN": repr(ship.heun),
+        "LIMITS": _tuple(PYTHON.number(x) for x in ship.limits),
+        "COEFFICIENTS": "\n".join(
+            f"    {inert(n.name)!r}: ({n.value!r}, {inert(n.unit)!r}, {inert(n.meaning)!r}),"
+            for n in ship.numbers
+        ),
+        "MATRICES": "".join(_matrix(i, m) for i, m in enumerate(ship.equations.matrices)) + "\n",
+        "CONSTANTS": str(made.constants), "HOISTED": _indented(made.hoisted),
+        "VARYING": _indented(made.varying) or "    pass",
+        "SURGE": made.outputs[0], "SWAY": made.outputs[1], "YAW": made.outputs[2],
+    })  # fmt: skip
+
+
+def sail(ship: Ship, trial: Trial, path: Path) -> np.ndarray:
+    """[n, 6] by the file itself, which shiplog has just written."""
+    known: dict = {"__name__": ship.identifier}
+    exec(compile(path.read_text("utf-8"), path.name, "exec"), known)
+    made = known["Ship"](*trial.start)
+    found = np.empty((len(trial.orders), 6))
+    for k, orders in enumerate(trial.orders):
+        driven = dict(zip(known["ACTUATORS"], orders, strict=True))
+        found[k] = made.step(driven, trial.water.wind, trial.water.current)
+    return found
+
+
+def version() -> str:
+    return np.__version__
+
+
+def _tuple(words) -> str:
+    return "".join(f"{word}, " for word in words).rstrip(" ")
+
+
+def _indented(lines: Sequence[str]) -> str:
+    return "\n".join(f"    {line}" for line in lines)
+
+
+def _matrix(place: int, matrix: np.ndarray) -> str:
+    text = base64.b64encode(np.ascontiguousarray(matrix, dtype="<f8").tobytes()).decode()
+    return f'MATRIX{place} = _matrix({len(matrix)}, "{text}")\n'
+
+
+def _product(name: str, matrix: int, rows: int, given: list[str]) -> list[str]:
+    return [f"{name} = _times(MATRIX{matrix}, {', '.join(given)})"]
