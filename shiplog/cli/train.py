@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -23,15 +24,19 @@ from shiplog.cli.options import (
 )
 from shiplog.cli.output import answer
 from shiplog.exceptions import UsageError, listed
-from shiplog.models import FORCES, MODELS, PHYSICS
+from shiplog.foreign.source import recognised
+from shiplog.models import FORCES, FOREIGN, MODELS, PHYSICS
 from shiplog.nomenclature.channels import AUTO_WINDOW
 from shiplog.voyages.windows.augmentation import AUGMENTATIONS
+
+OWN = [name for name, kind in MODELS.items() if kind.family is not FOREIGN]
 
 Out = Annotated[Path, typer.Option(help="The run folder to make.")]
 Model = Annotated[
     str,
     typer.Option(
-        help=f"Which dynamic model: {', '.join(MODELS)}; begin with mmg.",
+        help=f"Which dynamic model: {', '.join(OWN)}, of which begin with mmg; or the file of a "
+        "simulator of your own: FILE.py, FILE.fmu, or 'logs:/TOPIC'.",
         autocompletion=completion.of_words(MODELS),
     ),
 ]
@@ -116,12 +121,24 @@ SheetProfile = Annotated[
     typer.Option("--profile", help="With --trial-sheet: the ship's profile, a name or a path."),
 ]
 
+Mapping = Annotated[
+    Path | None,
+    typer.Option(
+        help="An FMU: TOML that says which of its variables is which channel; drafted where there "
+        "is none.",
+    ),
+]
+WINDOW_OF_SIMULATORS = 100  # s, where --window auto says nothing to a simulator
+
 NO_MODEL = (
     "No --model is given: this trains {model}, the paper's network. To begin with a ship, take "
     "--model mmg: it needs fewer voyages, and its coefficients have a meaning."
 )
 OF_SHEET = (  # those that go with --trial-sheet
     "out", "trial_sheet", "profile", "model", "parameters", "without", "free", "json_to",
+)  # fmt: skip
+OF_SIMULATORS = (  # those that go with a simulator's file
+    "out", "model", "voyages", "validation", "window", "mapping", "store", "json_to", "unchecked",
 )  # fmt: skip
 OF_AGAIN = ("out", "again", "store", "json_to")  # parameters that go with --again
 
@@ -147,6 +164,7 @@ def train(
     folds: Folds = None,
     unchecked: Unchecked = False,
     again: Again = None,
+    mapping: Mapping = None,
     trial_sheet: TrialSheet = None,
     profile: SheetProfile = None,
     store: StoreOption = STORE,
@@ -174,6 +192,9 @@ def train(
         parameters=parameters, without=tuple(without or ()), free=tuple(free or ()), folds=folds,
         unchecked=unchecked,
     )  # fmt: skip
+    if recognised(model):
+        _refuse_of_simulators(context)
+        options = replace(options, model=next(iter(MODELS)))
     options.check()
     refuse_run(out)
     check_writable(out, "--out")
@@ -200,6 +221,17 @@ def train(
             hint="leave it out.",
         )
     check_voyages(store, voyages, validation)
+    if recognised(model):
+        from shiplog.commands.bars import loading
+
+        with loading():
+            from shiplog.commands.train_foreign import foreign_command
+        found = foreign_command(
+            model, store, out, options.voyages, options.validation, WINDOW_OF_SIMULATORS
+            if options.window == AUTO_WINDOW else options.window, mapping,
+        )  # fmt: skip
+        answer(found, json_to)
+        return
     if not _typed(context, "model"):
         typer.echo(NO_MODEL.format(model=model), err=True)
     from shiplog.commands.bars import loading
@@ -208,6 +240,21 @@ def train(
         from shiplog.commands.train import train_command
     found = train_command(store, out, options)
     answer(found, json_to)
+
+
+def _refuse_of_simulators(context: typer.Context) -> None:
+    """Raises UsageError for an option that trains: a simulator is taken as it is."""
+    given = [
+        "no-fit" if (name, value) == ("fit", False) else name.replace("_", "-")
+        for name, value in context.params.items()
+        if name not in OF_SIMULATORS and _typed(context, name)
+    ]
+    if given:
+        raise UsageError(
+            f"A simulator of your own is taken as it is: {listed(f'--{name}' for name in given)} "
+            "says nothing to it.",
+            hint="leave it out.",
+        )
 
 
 def _refuse_others(context: typer.Context) -> None:

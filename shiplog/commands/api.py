@@ -200,20 +200,22 @@ def train(
     return load_model.load(into)
 
 
-def load(path: str | Path, causes: Files = ()) -> Run:
+def load(path: str | Path, causes: Files = (), *, simulators: Files = ()) -> Run:
     """A finished run. `causes`: Python files of its causes that are not in the catalogue, which
-    are executed. Raises RunError."""
+    are executed. `simulators`: files of simulators of your own, for a run of one: it is run in a
+    child process. Raises RunError."""
     from shiplog.models.causes import user
     from shiplog.training.runs import load_model
 
-    return load_model.load(Path(path), user.load(_files(causes)))
+    return load_model.load(Path(path), user.load(_files(causes)), _given(simulators))
 
 
 def evaluate(
-    runs: AnyRuns, store: AnyStore, voyages: Names = (), *, causes: Files = ()
-) -> Evaluation:
+    runs: AnyRuns, store: AnyStore, voyages: Names = (), *, causes: Files = (),
+    simulators: Files = (),
+) -> Evaluation:  # fmt: skip
     """Simulated against measured, window by window, with baselines. Without `voyages`, those that
-    the run kept for its test. `causes`: as for `load`. Raises ShiplogError.
+    the run kept for its test. `causes` and `simulators`: as for `load`. Raises ShiplogError.
 
     Of one run `evaluation.loss` is its mean L, `evaluation.rmse` its errors, and so on; of several
     `evaluation["mmg"].loss`. `evaluation.baselines` is what they compare with.
@@ -221,7 +223,7 @@ def evaluate(
     from shiplog.commands import evaluate as evaluating
 
     return evaluating.evaluate_runs(
-        _runs(runs), Store(_path(store)), _names(voyages), _files(causes)
+        _runs(runs), Store(_path(store)), _names(voyages), _files(causes), _given(simulators)
     )
 
 
@@ -233,6 +235,7 @@ def compare(
     save: str | Path | None = None,
     causes: Files = (),
     at: str | None = None,
+    simulators: Files = (),
 ) -> Comparison:
     """The same as a Rerun recording: `save`, or compare.rrd in the first run. `save` may also be
     a .png, .svg or .html. `at`: "VOYAGE:SECONDS" that it is opened at. Raises ShiplogError."""
@@ -240,7 +243,13 @@ def compare(
 
     to = None if save is None else Path(save)
     done = comparing.compare_runs(
-        _runs(runs), Store(_path(store)), _names(voyages), to, _files(causes), at
+        _runs(runs),
+        Store(_path(store)),
+        _names(voyages),
+        to,
+        _files(causes),
+        at,
+        _given(simulators),
     )
     done.written()
     return done
@@ -255,6 +264,7 @@ def diagnose(
     extend: str | Path | None = None,
     causes: Files = (),
     ray: str | None = None,
+    simulators: Files = (),
 ) -> Diagnosis:
     """What the model gets wrong on these voyages, why, and what the causes gain on held-out ones.
 
@@ -262,6 +272,7 @@ def diagnose(
     extend   write the model with the named causes as this run
     causes   Python files with causes of your own, which are executed
     ray      address of a Ray cluster that holds the segments, for very many voyages
+    simulators   as for `load`
 
     Raises ShiplogError.
     """
@@ -271,7 +282,7 @@ def diagnose(
     (path,) = _runs(run)
     return diagnosing.diagnose_run(
         path, Store(_path(store)), _names(voyages), Path(out), extend=to,
-        cause_files=_files(causes), ray=ray,
+        cause_files=_files(causes), ray=ray, simulators=_given(simulators),
     )  # fmt: skip
 
 
@@ -305,13 +316,14 @@ def gate(
     *,
     diagnosis: str | Path | None = None,
     causes: Files = (),
+    simulators: Files = (),
 ) -> Gate:
     """Limits of yours against today's results: `holds`, and an outcome for each limit.
 
     limits     TOML, as docs/use/gate.md has it
     diagnosis  folder of a diagnosis of these voyages, for limits on verdict and causes; made there
                where there is none
-    causes     as for `load`
+    causes, simulators   as for `load`
 
     Raises ShiplogError.
     """
@@ -321,7 +333,7 @@ def gate(
     where = None if diagnosis is None else Path(diagnosis)
     return gating.gate_run(
         path, Store(_path(store)), Path(limits), _names(voyages), diagnosis=where,
-        cause_files=_files(causes),
+        cause_files=_files(causes), simulators=_given(simulators),
     )  # fmt: skip
 
 
@@ -338,6 +350,7 @@ def simulate(
     seed: int = 0,
     out: str | Path | None = None,
     causes: Files = (),
+    simulators: Files = (),
 ) -> Simulation:
     """A run's model on a manoeuvre of `shiplog.simulation.schedules`, on the orders of a CSV file,
     or, with `store`, on the inputs of the voyage of that name.
@@ -356,7 +369,7 @@ def simulate(
     from shiplog.simulation.sailing import Water, from_direction
 
     (path,) = _runs(run)
-    opened = simulating.load(path, _files(causes))
+    opened = simulating.load(path, _files(causes), _given(simulators))
     to = None if out is None else Path(out)
     if store is not None:
         return simulating.simulate_voyage(
@@ -416,6 +429,7 @@ def find_manoeuvres(
     members: int = 100,
     full_load: bool = False,
     causes: Files = (),
+    simulators: Files = (),
 ) -> ManoeuvreSheet:
     """Turns, zigzags, stops, pull-outs and spirals of these voyages, all of the store where none
     is named: measured, and sailed by a run and an extended one. Without `store`, what the runs
@@ -426,7 +440,7 @@ def find_manoeuvres(
     where = None if store is None else Store(_path(store))
     return finding.manoeuvres_of(
         _runs(runs), where, _names(voyages), _files(causes), scale=scale, members=members,
-        full_load=full_load,
+        full_load=full_load, simulators=_given(simulators),
     )  # fmt: skip
 
 
@@ -441,6 +455,13 @@ def _names(voyages: Names) -> list[str]:
 
 def _files(files: Paths) -> list[Path]:
     return [Path(one) for one in ([files] if isinstance(files, str | Path) else files)]
+
+
+def _given(simulators: Paths) -> list[str]:
+    """Files of simulators, or FILE.py:NAME."""
+    return [
+        str(one) for one in ([simulators] if isinstance(simulators, str | Path) else simulators)
+    ]
 
 
 def _profile(profile: str | Path | None) -> str | None:

@@ -1,0 +1,79 @@
+"""An MMG of the ship that stands in for a simulator whose coefficients nobody can change.
+
+A cause that changes the ship (fouling, payload, a rudder's force) changes coefficients c. Where a
+simulator has none that are known, the same change of an MMG g is added to it,
+
+    ν̇ = f(x, u, ω) + g(x, u, ω; c') - g(x, u, ω; c)
+
+c is fitted to the simulator's accelerations f at rows of the training voyages, ridge regression
+towards the published or estimated ones c₀ with plausible spreads s, by Gauss-Newton:
+
+    min_c Σ |(f - g(c)) / σ|² + Σ ((c - c₀)/s)²,   σ = MISFIT times the root mean square of f
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shiplog.models.coefficients import Parameters
+from shiplog.models.mmg import MMG
+from shiplog.simulation.kernel import rollouts
+
+MISFIT = 0.05  # of the acceleration: an MMG describes a ship to some hundredths
+ROWS = 1500  # of the training voyages, at most: fifty for each coefficient
+ROUNDS = 12  # of Gauss-Newton
+# Root mean square of what the stand-in leaves of the acceleration, over its root mean square, from
+# which on it is not of this ship: a change of it would not be a change of the simulator
+POOR = 0.5
+
+
+@dataclass(frozen=True)
+class StandIn:
+    """values [P] of its coefficients; misfit [3], what it leaves of surge, sway and yaw, as a share
+    of their root mean square."""
+
+    values: np.ndarray
+    misfit: np.ndarray
+
+    @property
+    def poor(self) -> bool:
+        return bool(np.median(self.misfit) > POOR)
+
+
+def fit(model: MMG, start: Parameters, rows: np.ndarray, accelerations: np.ndarray) -> StandIn:
+    """From rows (state, actuators, wind over ground) [n, 6 + A + 2] and the simulator's f [n, 3]."""
+    known = np.isfinite(accelerations).all(1)
+    rows, f = rows[known], accelerations[known]
+    size = np.sqrt((f**2).mean(0)) + 1e-9
+    sigma, c = MISFIT * size, start.values.copy()
+    best, least = c, np.inf
+    for _ in range(ROUNDS):
+        g, by = _slopes(model, c, rows)
+        left = (f - g) / sigma
+        cost = (left**2).sum() + (((c - start.values) / start.spread) ** 2).sum()
+        if not np.isfinite(cost):
+            break
+        if cost < least:
+            best, least = c, cost
+        J = (by / sigma[:, None]).reshape(-1, len(c)) * start.spread
+        q = J.T @ left.ravel() - (c - start.values) / start.spread
+        step = np.linalg.solve(J.T @ J + np.eye(len(c)), q) * start.spread
+        c = np.clip(c + step, start.low, start.high)
+    g, _ = _slopes(model, best, rows)
+    return StandIn(best, np.sqrt(((f - g) ** 2).mean(0)) / size)
+
+
+def _slopes(model: MMG, c: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """g [n, 3] and ∂g/∂c [n, 3, P]."""
+    found = rollouts.row_slopes(model, c, rows)
+    if found is not None:
+        return found[0], found[3]
+    h = 1e-6 * np.maximum(np.abs(c), 1e-2)  # where no kernel is made: by differences
+
+    def at(values: np.ndarray) -> np.ndarray:
+        return np.asarray(model.acceleration(values, rows[:, :6], rows[:, 6:-2], rows[:, -2:]))
+
+    apart = [(at(c + e) - at(c - e)) / (2.0 * e.max()) for e in np.diag(h)]
+    return at(c), np.stack(apart, -1)
