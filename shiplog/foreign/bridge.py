@@ -96,6 +96,14 @@ class Bridge:
         (found,) = self._shared("roll", [start, driven, dt, begin], (), [(driven.shape[1], 6)])
         return found, self.troubles[before:]
 
+    def along(
+        self, start: np.ndarray, acceleration: np.ndarray, driven: np.ndarray, step: np.ndarray
+    ) -> np.ndarray:
+        """States [S, K, 6]."""
+        given, shape = [start, acceleration, driven], (driven.shape[1], 6)
+        (found,) = self._shared("along", given, (step,), [shape])
+        return found
+
     # --- children ---
 
     @property
@@ -141,7 +149,8 @@ class Bridge:
             self._restart(number)
             count = part.stop - part.start
             if count == 1:
-                second = float(given[0][0, -1]) if do != "roll" else float(given[3][0])
+                begin = {"roll": given[3][0] if do == "roll" else 0.0, "along": 0.0}
+                second = float(begin.get(do, given[0][0, -1]))
                 self._note(Trouble(part.start, second, str(error)))
                 return
             half = count // 2

@@ -82,5 +82,24 @@ def by_steps(
     return found[..., :STATES], list(failures.first.values())
 
 
+def along(
+    rates: Rates, start: np.ndarray, acceleration: np.ndarray, driven: np.ndarray, step: float
+) -> tuple[np.ndarray, list[Trouble]]:
+    """Paths of segments [S, K, 6]: two-step Adams-Bashforth, the first step by Euler, with
+    accelerations [S, K, 3] added; see `diagnosis.linear.foreign_paths`."""
+    failures, states, before = Failures(), [start], None
+    x = start
+    with np.errstate(all="ignore"):
+        for k in range(driven.shape[1] - 1):
+            rows = stacked(x, driven[:, k], 0.0)
+            found, troubles = rates(rows)
+            failures.add(troubles)
+            now = rate(rows, found + acceleration[:, k])
+            x = x + step * (now if before is None else 1.5 * now - 0.5 * before)
+            before = now
+            states.append(x)
+    return np.stack(states, 1), list(failures.first.values())
+
+
 def _between(driven: np.ndarray, i: int, part: float) -> np.ndarray:
     return driven[:, i] + part * (driven[:, i + 1] - driven[:, i])

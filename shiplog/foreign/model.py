@@ -61,6 +61,13 @@ class Foreign:
         """States [N, I, 6] from `start` [N, 6], `begin` [N] s into their voyages."""
         return self.opened().roll(start, driven, dt, begin)
 
+    def along(
+        self, start: np.ndarray, acceleration: np.ndarray, driven: np.ndarray, step: float
+    ) -> np.ndarray:
+        """States [S, K, 6] from `start` [S, 6], with accelerations [S, K, 3] added, by two-step
+        Adams-Bashforth."""
+        return self.opened().along(start, acceleration, driven, np.array([step]))
+
 
 def steps_of(rows: np.ndarray, places: bool) -> np.ndarray:
     """Steps [D - 1] of differences, from rows [n, D] of the ship's; `places`: whether the

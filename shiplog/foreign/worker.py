@@ -7,6 +7,7 @@ the shapes of the arrays of doubles that follow it, and so is an answer.
 | rates | rows [n, D] | ν̇ [n, 3] |
 | slopes | rows [n, D], steps [D - 1] | ν̇ [n, 3], ∂ν̇/∂(x, u, ω) [n, 3, D - 1] |
 | roll | start, driven, dt, begin | states [N, I, 6] |
+| along | start, acceleration, driven, step | states [S, K, 6] |
 
 A row is as in `rows`, D = 6 + A + 3. Each answer has the troubles: row, second and words.
 """
@@ -141,6 +142,10 @@ def answered(
         return [found], troubles
     if do == "slopes":
         return slopes(simulator, *arrays)
+    if do == "along":
+        *given, step = arrays
+        states, troubles = integrate.along(simulator.rates, *given, float(step[0]))
+        return [states], troubles
     states, troubles = simulator.roll(*arrays)
     return [states], troubles
 

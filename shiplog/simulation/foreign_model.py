@@ -21,12 +21,14 @@ import numpy as np
 
 from shiplog.machine import trees
 from shiplog.machine.arrays import Array, jnp
+from shiplog.models.base import kinematics
+from shiplog.models.causes import Cause
 from shiplog.models.extended import Extended
 from shiplog.nomenclature.frames import in_body_axes, in_earth_axes
 from shiplog.simulation.each_its_own import EachItsOwn
 from shiplog.simulation.kernel import rollouts
 from shiplog.simulation.window_series import WindowSeries, series
-from shiplog.voyages.windows.windows import Windows
+from shiplog.voyages.windows.windows import Windows, seconds_since
 
 SUBSTEPS = 4  # of Heun's in a measured step, with causes that push: 0.25 s of a ship of metres
 
@@ -41,6 +43,9 @@ class Simulator(Protocol):
     def roll(
         self, start: np.ndarray, driven: np.ndarray, dt: np.ndarray, begin: np.ndarray
     ) -> tuple[np.ndarray, list[Any]]: ...
+    def along(
+        self, start: np.ndarray, acceleration: np.ndarray, driven: np.ndarray, step: float
+    ) -> np.ndarray: ...
 
 
 @trees.tree(data=[])
@@ -78,8 +83,8 @@ def values(model: Any, theta: np.ndarray, inputs: np.ndarray) -> np.ndarray:
     state, driven = inputs[:, :6], inputs[:, 6:]
     if not isinstance(model, Extended):
         return simulator.accelerations(state, driven)
-    wet, given, _ = _wet(model, theta, state, driven)
-    return simulator.accelerations(wet, given) + _added(model, theta, inputs)
+    wet, given, water = _wet(model, theta, state, driven)
+    return simulator.accelerations(wet, given) + _added(model, theta, inputs, water)
 
 
 def slopes(
@@ -123,9 +128,28 @@ def rollout(
     if not isinstance(model, Extended):
         driven = np.concatenate((data.actuator, data.wind), -1)
         return simulator.roll(start, driven, data.dt, began)[0]
-    if any(_pushes(cause) for cause in model.causes):
+    if _pushed(model, theta):
         return _by_heun(model, theta, data)
     return _in_water(model, theta, data, began)
+
+
+def along(
+    model: Any, theta: np.ndarray, start: np.ndarray, acceleration: np.ndarray,
+    driven: np.ndarray, step: float,
+) -> np.ndarray | None:  # fmt: skip
+    """States [S, K, 6] of a segment's path, as `diagnosis.linear.foreign_paths` has it, by the
+    simulator alone, in one request; None where causes push, whose forces it does not know."""
+    simulator = simulator_of(model)
+    assert simulator is not None
+    if not isinstance(model, Extended):
+        return simulator.along(start, acceleration, driven, step)
+    if _pushed(model, theta):
+        return None
+    wet, _, _ = _wet(model, theta, start, driven[:, 0])
+    given, water = _without_share(driven), _water(model, theta)
+    given[..., -2:] += water
+    found = simulator.along(wet, acceleration, given, step)
+    return _from_water(found, water, step * np.arange(driven.shape[1]))
 
 
 @dataclass(frozen=True)
@@ -175,18 +199,26 @@ def _rest(model: Extended) -> Extended:
     return replace(model, base=Nothing())
 
 
-def _pushes(cause: Any) -> bool:
-    """Whether it adds an acceleration, and does not only move the water or change readings."""
-    from shiplog.models.causes import Cause
+def _pushed(model: Extended, theta: np.ndarray) -> bool:
+    """Whether a cause with numbers that are not zero adds an acceleration, and does not only move
+    the water or change readings: one whose numbers are zero adds nothing."""
+    at = len(model.base.names)
+    for cause in model.causes:
+        kind, numbers = type(cause), theta[..., at : at + cause.count]
+        pushes = kind.coefficients is not Cause.coefficients or kind.force is not Cause.force
+        if pushes and np.any(numbers):
+            return True
+        at += cause.count
+    return False
 
-    kind = type(cause)
-    return kind.coefficients is not Cause.coefficients or kind.force is not Cause.force
 
-
-def _added(model: Extended, theta: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-    """c [n, 3]"""
-    if not model.causes:
-        return np.zeros((len(inputs), 3))
+def _added(
+    model: Extended, theta: np.ndarray, inputs: np.ndarray, water: tuple[np.ndarray, np.ndarray]
+) -> np.ndarray:
+    """c [n, 3], in water that goes `water` ahead and to starboard."""
+    if not _pushed(model, theta):
+        (ahead, starboard), r = water, inputs[:, 5]
+        return np.stack((r * starboard, -r * ahead, np.zeros_like(r)), -1)
     rest = _rest(model)
     if theta.ndim == 2:
         rest = EachItsOwn(rest, theta.shape[1])
@@ -232,9 +264,14 @@ def _wet(
     wet = state.copy()
     wet[:, 1] -= ahead
     wet[:, 3] -= starboard
-    given = np.delete(driven, driven.shape[1] - 3, axis=1)
+    given = _without_share(driven)
     given[:, -2:] += water
     return wet, given, (ahead, starboard)
+
+
+def _without_share(driven: np.ndarray) -> np.ndarray:
+    """What drives [..., A + 2], of that with the share of the campaign [..., A + 3]."""
+    return np.delete(driven, driven.shape[-1] - 3, axis=-1)
 
 
 def _in_water(
@@ -242,17 +279,22 @@ def _in_water(
 ) -> np.ndarray:
     """The simulator on a path through water that moves with V, in axes that move with it: a steady
     current changes nothing else."""
-    count, size, _ = data.measured.shape
-    flat = data.measured[:, 0]
     driven = np.concatenate((data.actuator, data.wind), -1)
-    wet, _, _ = _wet(model, theta, flat, driven[:, 0])
-    water = _water(model, theta)
-    given = np.delete(driven, driven.shape[-1] - 3, axis=-1)
+    wet, _, _ = _wet(model, theta, data.measured[:, 0], driven[:, 0])
+    given, water = _without_share(driven), _water(model, theta)
     given[..., -2:] += water
     simulator = simulator_of(model)
     assert simulator is not None
-    found = simulator.roll(wet, given, data.dt, begin)[0].copy()
-    since = np.concatenate((np.zeros((count, 1)), np.cumsum(data.dt, 1)), 1)
+    found, _ = simulator.roll(wet, given, data.dt, begin)
+    return _from_water(found, water, seconds_since(data.dt))
+
+
+def _from_water(found: np.ndarray, water: np.ndarray, since: np.ndarray) -> np.ndarray:
+    """States [N, I, 6] over ground, of those in axes that go with the water; `since` [N, I] or [I]
+    s since they were the same."""
+    if not water.any():
+        return found
+    found = found.copy()
     c, s = np.cos(found[..., 4]), np.sin(found[..., 4])
     ahead, starboard = in_body_axes(water[0], water[1], c, s)
     found[..., 1] += ahead
@@ -267,8 +309,6 @@ def _by_heun(model: Extended, theta: np.ndarray, data: WindowSeries) -> np.ndarr
     x, states = data.measured[:, 0], [data.measured[:, 0]]
 
     def rate(x: np.ndarray, u: np.ndarray) -> np.ndarray:
-        from shiplog.models.base import kinematics
-
         return kinematics(x, values(model, theta, np.concatenate((x, u), 1)))
 
     with np.errstate(all="ignore"):

@@ -21,6 +21,9 @@ def states_along(
 ) -> np.ndarray:  # fmt: skip
     """xₖ₊₁ = xₖ + h ((3/2) fₖ - (1/2) fₖ₋₁), fₖ = ẋ(xₖ, uₖ; θ) + (0, a_u, 0, a_v, 0, a_r)ₖ, the
     first step by Euler: states [S, K, 6]."""
+    found = foreign_model.along(model, theta, start, acceleration, driven, step)
+    if found is not None:
+        return found
     x, states, before = start, [start], None
     for k in range(driven.shape[1] - 1):
         rows = np.concatenate((x, driven[:, k]), 1)
