@@ -226,10 +226,10 @@ def train(
 
         with loading():
             from shiplog.commands.train_foreign import foreign_command
+        size = WINDOW_OF_SIMULATORS if options.window == AUTO_WINDOW else options.window
         found = foreign_command(
-            model, store, out, options.voyages, options.validation, WINDOW_OF_SIMULATORS
-            if options.window == AUTO_WINDOW else options.window, mapping,
-        )  # fmt: skip
+            model, store, out, options.voyages, options.validation, int(size), mapping, unchecked
+        )
         answer(found, json_to)
         return
     if not _typed(context, "model"):

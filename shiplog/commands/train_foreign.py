@@ -13,6 +13,7 @@ import polars as pl
 from shiplog.commands.bars import reach, staged
 from shiplog.commands.identify import baseline_losses
 from shiplog.exceptions import ProfileError
+from shiplog.foreign import mapped
 from shiplog.foreign import model as foreign_models
 from shiplog.foreign import source as sources
 from shiplog.foreign.source import Source
@@ -40,17 +41,25 @@ STAGES = {"opening": 2.0, "simulating": 3.0, "stand-in": 5.0}
 def foreign_command(
     given: str, store_path: Path, out: Path, voyages: tuple[str, ...],
     validation: tuple[str, ...], window: int, mapping: Path | None = None,
+    unchecked: bool = False,
 ) -> Answer:  # fmt: skip
     """Raises ShiplogError."""
     store, source = Store(store_path), sources.read(given)
     split = choose(store, voyages, validation, "ref", window)
     say(split)
-    return foreign_run_of(source, store, out, split, window, mapping).answer(store.path)
+    done = foreign_run_of(source, store, out, split, window, mapping, unchecked)
+    return done.answer(store.path)
 
 
 @staged("simulator", STAGES)
 def foreign_run_of(
-    source: Source, store: Store, out: Path, split: Split, window: int, mapping: Path | None = None
+    source: Source,
+    store: Store,
+    out: Path,
+    split: Split,
+    window: int,
+    mapping: Path | None = None,
+    unchecked: bool = False,
 ) -> ForeignTraining:
     """The run of a simulator, with what it gets wrong on the voyages that it is good for."""
     began, used = time.time(), [*split.training, *split.validation]
@@ -66,6 +75,7 @@ def foreign_run_of(
     settings = Foreign(
         name=source.name, sha256=source.sha256, kind=source.kind,  # type: ignore[arg-type]
         function=source.function,
+        mapping=mapped.of(source, profile, mapping, unchecked) if source.kind == "fmu" else {},
     )  # fmt: skip
     reach("opening")
     bridge = foreign_run.bridge(source, profile, settings, probe)

@@ -67,6 +67,26 @@ class Bridge:
     _facts: dict[str, Any] | None = None
     _restarts: int = 0
 
+    @staticmethod
+    def describe(source: Source) -> dict[str, Any]:
+        """What an FMU says of itself, read in a child. Raises SimulatorError."""
+        process, pipe = child.spawn(worker.serve, CALM)
+        try:
+            worker.send(pipe, {"do": "describe", "path": str(source.path)})
+            answer, _ = _received(pipe, OPENING_S)
+        except (_Ended, OSError) as error:
+            raise SimulatorError(
+                f"{source.name} {error}, when it was to be read.", hint="look into the FMU."
+            ) from error
+        finally:
+            _end(process, pipe)
+        if "refused" in answer:
+            raise SimulatorError(
+                f"{source.name} cannot be used: {answer['refused']}.",
+                hint="mend that, and give the same command again.",
+            )
+        return answer["facts"]
+
     # --- requests ---
 
     @property

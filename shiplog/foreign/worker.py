@@ -3,6 +3,7 @@ the shapes of the arrays of doubles that follow it, and so is an answer.
 
 | request | arrays | answer |
 | --- | --- | --- |
+| describe | | what an FMU says of itself |
 | open | rows to try [n, D] | facts of the simulator |
 | rates | rows [n, D] | ν̇ [n, 3] |
 | slopes | rows [n, D], steps [D - 1] | ν̇ [n, 3], ∂ν̇/∂(x, u, ω) [n, 3, D - 1] |
@@ -69,6 +70,11 @@ def serve(pipe: Connection) -> None:
         except (EOFError, OSError):
             return
         try:
+            if head["do"] == "describe":
+                from shiplog.foreign.fmu import description
+
+                send(pipe, {"facts": description(Path(head["path"]))})
+                continue
             if head["do"] == "open":
                 simulator, facts = opened(head, arrays[0])
                 send(pipe, {"facts": facts | {"unlimited": lacking}, "troubles": []})
