@@ -22,7 +22,7 @@ from shiplog.cli.options import (
     Validation,
     Width,
 )
-from shiplog.cli.output import answer
+from shiplog.cli.output import LOST, answer
 from shiplog.exceptions import UsageError, listed
 from shiplog.foreign.source import recognised
 from shiplog.models import FORCES, FOREIGN, MODELS, PHYSICS
@@ -231,6 +231,8 @@ def train(
             model, store, out, options.voyages, options.validation, int(size), mapping, unchecked
         )
         answer(found, json_to)
+        if not found.complete:
+            raise typer.Exit(LOST)
         return
     if not _typed(context, "model"):
         typer.echo(NO_MODEL.format(model=model), err=True)

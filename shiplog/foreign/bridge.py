@@ -10,17 +10,19 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
+import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from shiplog.foreign import worker
+from shiplog.foreign import progress, worker
 from shiplog.foreign.rows import Trouble
 from shiplog.foreign.source import SimulatorError, Source
-from shiplog.machine import child
+from shiplog.machine import child as children
 
 log = logging.getLogger(__name__)
 
@@ -49,6 +51,21 @@ class _Ended(Exception):
     """A child is no more, with what is to be said of it."""
 
 
+@dataclass(frozen=True)
+class _Child:
+    """process, its pipe, and the file in which it says how far it has come."""
+
+    process: Any
+    pipe: Connection
+    progress: Path
+
+    def end(self) -> None:
+        self.pipe.close()
+        self.process.kill()
+        self.process.join()
+        self.progress.unlink(missing_ok=True)
+
+
 @dataclass
 class Bridge:
     """Children of one simulator; they start with the first request.
@@ -63,14 +80,14 @@ class Bridge:
     settings: Mapping[str, Any]
     probe: np.ndarray
     troubles: list[Trouble] = field(default_factory=list)
-    _children: list[tuple[Any, Connection]] = field(default_factory=list)
+    _children: list[_Child] = field(default_factory=list)
     _facts: dict[str, Any] | None = None
     _restarts: int = 0
 
     @staticmethod
     def describe(source: Source) -> dict[str, Any]:
         """What an FMU says of itself, read in a child. Raises SimulatorError."""
-        process, pipe = child.spawn(worker.serve, CALM)
+        process, pipe = children.spawn(worker.serve, CALM)
         try:
             worker.send(pipe, {"do": "describe", "path": str(source.path)})
             answer, _ = _received(pipe, OPENING_S)
@@ -79,7 +96,9 @@ class Bridge:
                 f"{source.name} {error}, when it was to be read.", hint="look into the FMU."
             ) from error
         finally:
-            _end(process, pipe)
+            pipe.close()
+            process.kill()
+            process.join()
         if "refused" in answer:
             raise SimulatorError(
                 f"{source.name} cannot be used: {answer['refused']}.",
@@ -153,9 +172,10 @@ class Bridge:
         return found
 
     def _send(self, number: int, do: str, given: Sequence[np.ndarray]) -> None:
-        _, pipe = self._child(number)
+        child = self._child(number)
+        progress.begun(child.progress)
         with contextlib.suppress(OSError):  # that it has ended is found when it is to answer
-            worker.send(pipe, {"do": do}, given)
+            worker.send(child.pipe, {"do": do}, given)
 
     def _answer(
         self, number: int, part: slice, do: str, given: list[np.ndarray], by_row: int,
@@ -166,11 +186,11 @@ class Bridge:
         try:
             head, arrays = self._received(number, PATIENCE_S)
         except _Ended as error:
+            reached = progress.read(self._children[number].progress)
             self._restart(number)
             count = part.stop - part.start
             if count == 1:
-                begin = {"roll": given[3][0] if do == "roll" else 0.0, "along": 0.0}
-                second = float(begin.get(do, given[0][0, -1]))
+                second = reached if np.isfinite(reached) else float(given[0][0, -1])
                 self._note(Trouble(part.start, second, str(error)))
                 return
             half = count // 2
@@ -195,30 +215,33 @@ class Bridge:
         if len(self.troubles) < 10_000:
             self.troubles.append(trouble)
 
-    def _child(self, number: int) -> tuple[Any, Connection]:
+    def _child(self, number: int) -> _Child:
         while len(self._children) <= number:
             self._children.append(self._started())
         return self._children[number]
 
-    def _started(self) -> tuple[Any, Connection]:
+    def _started(self) -> _Child:
         """A child in which the simulator is open. Raises SimulatorError."""
-        process, pipe = child.spawn(worker.serve, CALM)
+        number, name = tempfile.mkstemp(prefix="shiplog-progress-")
+        os.close(number)
+        progress.begun(Path(name))
+        new = _Child(*children.spawn(worker.serve, CALM), Path(name))
         head = {
             "do": "open", "path": str(self.source.path), "kind": self.source.kind,
             "function": self.source.function, "actuators": len(self.ship.actuators),
-            "wind": self.ship.wind, "mapping": self.settings,
+            "wind": self.ship.wind, "mapping": self.settings, "progress": name,
         }  # fmt: skip
         try:
-            worker.send(pipe, head, [self.probe])
-            answer, _ = _received(pipe, OPENING_S)
+            worker.send(new.pipe, head, [self.probe])
+            answer, _ = _received(new.pipe, OPENING_S)
         except (_Ended, OSError) as error:
-            _end(process, pipe)
+            new.end()
             raise SimulatorError(
                 f"{self.source.name} {error}, before it gave one step.",
                 hint="look into the simulator: it has to give a step of this ship.",
             ) from error
         if "refused" in answer:
-            _end(process, pipe)
+            new.end()
             raise SimulatorError(
                 f"{self.source.name} cannot be used: {answer['refused']}.",
                 hint="mend that, and give the same command again.",
@@ -227,17 +250,17 @@ class Bridge:
             self._facts = answer["facts"]
             for what in answer["facts"].get("unlimited", ()):
                 log.warning("%s: its %s cannot be limited here.", self.source.name, what)
-        return process, pipe
+        return new
 
     def _received(self, number: int, patience: float) -> tuple[dict[str, Any], list[np.ndarray]]:
-        head, arrays = _received(self._children[number][1], patience)
+        head, arrays = _received(self._children[number].pipe, patience)
         if "refused" in head:
             raise _Ended(head["refused"])
         return head, arrays
 
     def _restart(self, number: int) -> None:
         """Raises SimulatorError where it has ended too often."""
-        _end(*self._children[number])
+        self._children[number].end()
         self._restarts += 1
         if self._restarts > RESTARTS:
             raise SimulatorError(
@@ -247,8 +270,8 @@ class Bridge:
         self._children[number] = self._started()
 
     def close(self) -> None:
-        for process, pipe in self._children:
-            _end(process, pipe)
+        for one in self._children:
+            one.end()
         self._children.clear()
 
 
@@ -262,9 +285,3 @@ def _received(pipe: Connection, patience: float) -> tuple[dict[str, Any], list[n
         raise _Ended("ended its process") from error
     except (ValueError, KeyError, TypeError) as error:
         raise _Ended("gave an answer that cannot be read") from error
-
-
-def _end(process: Any, pipe: Connection) -> None:
-    pipe.close()
-    process.kill()
-    process.join()

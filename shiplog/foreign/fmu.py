@@ -24,6 +24,7 @@ import numpy as np
 
 from shiplog.foreign.callables import MOST_TROUBLES, Refused
 from shiplog.foreign.confinement import CALL_S, TooLong, time_limit
+from shiplog.foreign.progress import NOW
 from shiplog.foreign.rows import HEADING, STATES, VELOCITIES, Trouble, apparent
 
 SHORT = 0.02  # s, of an acceleration's steps; an FMU of a fixed inner step takes that one
@@ -182,7 +183,8 @@ class Fmu:
                     for k in range(count):
                         now = driven[n, i] + (k + 0.5) / count * (driven[n, i + 1] - driven[n, i])
                         row = _row(x, now, clock)
-                        self._set(self._values(row[None])[0])
+                        NOW.at(clock)
+                        self.inputs.set(self, self._values(row[None])[0])
                         self._advance(time, h)
                         time, clock = time + h, clock + h
                         x = self._states(row)
@@ -244,9 +246,6 @@ class Fmu:
             self.inputs.set(self, values)
             self._initialise()
             self.inputs.set(self, values)
-
-    def _set(self, values: np.ndarray) -> None:
-        self.inputs.set(self, values)
 
     def _reset(self) -> None:
         if self.instance is not None and not self.used:

@@ -13,6 +13,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from shiplog.foreign.progress import NOW
 from shiplog.foreign.rows import STATES, Trouble, rate, stacked
 
 SUBSTEPS = 10
@@ -41,6 +42,7 @@ def by_rates(
 
     def slope(x: np.ndarray, u: np.ndarray, time: np.ndarray) -> np.ndarray:
         rows = stacked(x, u, time)
+        NOW.at(float(time[0]))
         found, troubles = rates(rows)
         failures.add(troubles)
         return rate(rows, found)
@@ -71,6 +73,7 @@ def by_steps(
         for i in range(dt.shape[1]):
             count = max(1, round(float(np.median(dt[:, i])) / length))
             for k in range(count):
+                NOW.at(float(time[0]))
                 x, troubles = step(stacked(x, _between(driven, i, k / count), time))
                 failures.add(troubles)
                 time = time + length

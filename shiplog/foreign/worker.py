@@ -26,6 +26,7 @@ import numpy as np
 from shiplog.foreign import integrate
 from shiplog.foreign.callables import PythonFunction, Refused
 from shiplog.foreign.confinement import confine
+from shiplog.foreign.progress import NOW
 from shiplog.foreign.rows import Trouble
 
 MOST_BYTES = 1 << 30  # of one message
@@ -76,6 +77,7 @@ def serve(pipe: Connection) -> None:
                 send(pipe, {"facts": description(Path(head["path"]))})
                 continue
             if head["do"] == "open":
+                NOW.open(Path(head["progress"]))
                 simulator, facts = opened(head, arrays[0])
                 send(pipe, {"facts": facts | {"unlimited": lacking}, "troubles": []})
                 continue

@@ -184,15 +184,15 @@ EXPORT int fmi2SetReal(Instance s, const unsigned *r, size_t n, const double *v)
     return bad;
 }
 EXPORT int fmi2DoStep(Instance s, double t, double h, int n) { return step(s, h); }
-#define NOT2(name, ...) EXPORT int name(__VA_ARGS__) { return 3; }
-NOT2(fmi2GetInteger, void) NOT2(fmi2GetBoolean, void) NOT2(fmi2GetString, void)
-NOT2(fmi2SetInteger, void) NOT2(fmi2SetBoolean, void) NOT2(fmi2SetString, void)
-NOT2(fmi2GetFMUstate, void) NOT2(fmi2SetFMUstate, void) NOT2(fmi2FreeFMUstate, void)
-NOT2(fmi2SerializedFMUstateSize, void) NOT2(fmi2SerializeFMUstate, void)
-NOT2(fmi2DeSerializeFMUstate, void) NOT2(fmi2GetDirectionalDerivative, void)
-NOT2(fmi2SetRealInputDerivatives, void) NOT2(fmi2GetRealOutputDerivatives, void)
-NOT2(fmi2CancelStep, void) NOT2(fmi2GetStatus, void) NOT2(fmi2GetRealStatus, void)
-NOT2(fmi2GetIntegerStatus, void) NOT2(fmi2GetBooleanStatus, void) NOT2(fmi2GetStringStatus, void)
+#define NONE(name, ...) EXPORT int name(__VA_ARGS__) { return 3; }
+NONE(fmi2GetInteger, void) NONE(fmi2GetBoolean, void) NONE(fmi2GetString, void)
+NONE(fmi2SetInteger, void) NONE(fmi2SetBoolean, void) NONE(fmi2SetString, void)
+NONE(fmi2GetFMUstate, void) NONE(fmi2SetFMUstate, void) NONE(fmi2FreeFMUstate, void)
+NONE(fmi2SerializedFMUstateSize, void) NONE(fmi2SerializeFMUstate, void)
+NONE(fmi2DeSerializeFMUstate, void) NONE(fmi2GetDirectionalDerivative, void)
+NONE(fmi2SetRealInputDerivatives, void) NONE(fmi2GetRealOutputDerivatives, void)
+NONE(fmi2CancelStep, void) NONE(fmi2GetStatus, void) NONE(fmi2GetRealStatus, void)
+NONE(fmi2GetIntegerStatus, void) NONE(fmi2GetBooleanStatus, void) NONE(fmi2GetStringStatus, void)
 
 /* FMI 3.0 */
 EXPORT Text fmi3GetVersion(void) { return "3.0"; }
@@ -219,3 +219,36 @@ EXPORT int fmi3DoStep(
     *last = t + h;
     return status;
 }
+NONE(fmi3SetDebugLogging, void) NONE(fmi3InstantiateModelExchange, void)
+NONE(fmi3InstantiateScheduledExecution, void) NONE(fmi3EnterEventMode, void)
+NONE(fmi3ActivateModelPartition, void) NONE(fmi3CompletedIntegratorStep, void)
+NONE(fmi3DeserializeFMUState, void) NONE(fmi3EnterConfigurationMode, void)
+NONE(fmi3EnterContinuousTimeMode, void) NONE(fmi3EnterStepMode, void)
+NONE(fmi3EvaluateDiscreteStates, void) NONE(fmi3ExitConfigurationMode, void)
+NONE(fmi3FreeFMUState, void) NONE(fmi3GetAdjointDerivative, void)
+NONE(fmi3GetBinary, void) NONE(fmi3GetBoolean, void)
+NONE(fmi3GetClock, void) NONE(fmi3GetContinuousStateDerivatives, void)
+NONE(fmi3GetContinuousStates, void) NONE(fmi3GetDirectionalDerivative, void)
+NONE(fmi3GetEventIndicators, void) NONE(fmi3GetFMUState, void)
+NONE(fmi3GetFloat32, void) NONE(fmi3GetInt16, void)
+NONE(fmi3GetInt32, void) NONE(fmi3GetInt64, void)
+NONE(fmi3GetInt8, void) NONE(fmi3GetIntervalDecimal, void)
+NONE(fmi3GetIntervalFraction, void) NONE(fmi3GetNominalsOfContinuousStates, void)
+NONE(fmi3GetNumberOfContinuousStates, void) NONE(fmi3GetNumberOfEventIndicators, void)
+NONE(fmi3GetNumberOfVariableDependencies, void) NONE(fmi3GetOutputDerivatives, void)
+NONE(fmi3GetShiftDecimal, void) NONE(fmi3GetShiftFraction, void)
+NONE(fmi3GetString, void) NONE(fmi3GetUInt16, void)
+NONE(fmi3GetUInt32, void) NONE(fmi3GetUInt64, void)
+NONE(fmi3GetUInt8, void) NONE(fmi3GetVariableDependencies, void)
+NONE(fmi3SerializeFMUState, void) NONE(fmi3SerializedFMUStateSize, void)
+NONE(fmi3SetBinary, void) NONE(fmi3SetBoolean, void)
+NONE(fmi3SetClock, void) NONE(fmi3SetContinuousStates, void)
+NONE(fmi3SetFloat32, void) NONE(fmi3SetInt16, void)
+NONE(fmi3SetInt32, void) NONE(fmi3SetInt64, void)
+NONE(fmi3SetInt8, void) NONE(fmi3SetIntervalDecimal, void)
+NONE(fmi3SetIntervalFraction, void) NONE(fmi3SetShiftDecimal, void)
+NONE(fmi3SetShiftFraction, void) NONE(fmi3SetString, void)
+NONE(fmi3SetTime, void) NONE(fmi3SetUInt16, void)
+NONE(fmi3SetUInt32, void) NONE(fmi3SetUInt64, void)
+NONE(fmi3SetUInt8, void) NONE(fmi3UpdateDiscreteStates, void)
+NONE(fmi3SetFMUState, void)

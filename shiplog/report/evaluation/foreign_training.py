@@ -55,8 +55,10 @@ class ForeignTraining:
         sound = np.isfinite(self.losses)
         windows = f"{counted(len(self.losses), 'window')} of {run.config.window} s"
         baselines = ", ".join(f"{loss:.0f} {BASELINES[n]}" for n, loss in self.baselines.items())
-        loss = f"L {self.losses[sound].mean():.0f}" if sound.any() else "no L"
-        lost = "" if sound.all() else f" on {int(sound.sum())} of them; in the others it failed"
+        loss = f"L {self.losses[sound].mean():.0f}" if sound.any() else "It failed in every window"
+        lost = ""
+        if sound.any() and not sound.all():
+            lost = f" on {int(sound.sum())} of them; in the others it failed"
         return [
             f"{of.name} in {run.path}, nothing fitted; {listed(run.config.split.training)}: "
             f"{windows}.",

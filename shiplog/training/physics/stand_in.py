@@ -6,7 +6,7 @@ simulator has none that are known, the same change of an MMG g is added to it,
     ν̇ = f(x, u, ω) + g(x, u, ω; c') - g(x, u, ω; c)
 
 c is fitted to the simulator's accelerations f at rows of the training voyages, ridge regression
-towards the published or estimated ones c₀ with plausible spreads s, by Gauss-Newton:
+towards the published or estimated ones c₀ with plausible spreads s:
 
     min_c Σ |(f - g(c)) / σ|² + Σ ((c - c₀)/s)²,   σ = MISFIT times the root mean square of f
 """
@@ -23,7 +23,7 @@ from shiplog.simulation.kernel import rollouts
 
 MISFIT = 0.05  # of the acceleration: an MMG describes a ship to some hundredths
 ROWS = 1500  # of the training voyages, at most: fifty for each coefficient
-ROUNDS = 12  # of Gauss-Newton
+ROUNDS = 25  # of Gauss-Newton, damped or not
 # Root mean square of what the stand-in leaves of the acceleration, over its root mean square, from
 # which on it is not of this ship: a change of it would not be a change of the simulator
 POOR = 0.5
@@ -43,26 +43,33 @@ class StandIn:
 
 
 def fit(model: MMG, start: Parameters, rows: np.ndarray, accelerations: np.ndarray) -> StandIn:
-    """From rows (state, actuators, wind over ground) [n, 6 + A + 2] and the simulator's f [n, 3]."""
+    """From rows (state, actuators, wind over ground) [n, 6 + A + 2] and the simulator's f there
+    [n, 3]; damped where a step leads uphill (Levenberg 1944)."""
     known = np.isfinite(accelerations).all(1)
     rows, f = rows[known], accelerations[known]
     size = np.sqrt((f**2).mean(0)) + 1e-9
-    sigma, c = MISFIT * size, start.values.copy()
-    best, least = c, np.inf
+    sigma, P = MISFIT * size, len(start.values)
+
+    def cost(c: np.ndarray, g: np.ndarray) -> float:
+        found = (((f - g) / sigma) ** 2).sum() + (((c - start.values) / start.spread) ** 2).sum()
+        return float(found) if np.isfinite(found) else np.inf
+
+    c = start.values.copy()
+    g, by = _slopes(model, c, rows)
+    here, damping = cost(c, g), 1e-3
     for _ in range(ROUNDS):
-        g, by = _slopes(model, c, rows)
-        left = (f - g) / sigma
-        cost = (left**2).sum() + (((c - start.values) / start.spread) ** 2).sum()
-        if not np.isfinite(cost):
-            break
-        if cost < least:
-            best, least = c, cost
-        J = (by / sigma[:, None]).reshape(-1, len(c)) * start.spread
-        q = J.T @ left.ravel() - (c - start.values) / start.spread
-        step = np.linalg.solve(J.T @ J + np.eye(len(c)), q) * start.spread
-        c = np.clip(c + step, start.low, start.high)
-    g, _ = _slopes(model, best, rows)
-    return StandIn(best, np.sqrt(((f - g) ** 2).mean(0)) / size)
+        J = (by / sigma[:, None]).reshape(-1, P) * start.spread
+        q = J.T @ ((f - g) / sigma).ravel() - (c - start.values) / start.spread
+        N = J.T @ J + np.eye(P)
+        step = np.linalg.solve(N + damping * np.diag(np.diag(N)), q) * start.spread
+        tried = np.clip(c + step, start.low, start.high)
+        g_tried, by_tried = _slopes(model, tried, rows)
+        there = cost(tried, g_tried)
+        if there < here:
+            c, g, by, here, damping = tried, g_tried, by_tried, there, 0.1 * damping
+        else:
+            damping *= 10.0
+    return StandIn(c, np.sqrt(((f - g) ** 2).mean(0)) / size)
 
 
 def _slopes(model: MMG, c: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
