@@ -65,11 +65,9 @@ def read(given: str) -> Source:
     return Source(path.resolve(), kind, function, hashlib.sha256(content).hexdigest())
 
 
-def matching(
-    sources: Sequence[Source], run: str, name: str, sha256: str, needed: bool = True
-) -> Source | None:
-    """The one that a run was made of. Raises SimulatorError for another hash, and, where it is
-    needed, for none."""
+def matching(sources: Sequence[Source], run: str, name: str, sha256: str) -> Source | None:
+    """The one that a run was made of; None where it is not given. Raises SimulatorError for one of
+    its name with another hash."""
     for one in sources:
         if one.sha256 == sha256:
             return one
@@ -80,8 +78,6 @@ def matching(
             f"{other.sha256[:12]}, that of the run's with {sha256[:12]}.",
             hint="give the very file, or train a run of this one.",
         )
-    if needed:
-        raise absent(run, name, sha256)
     return None
 
 

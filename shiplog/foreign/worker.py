@@ -135,7 +135,7 @@ def checked(simulator: Simulator, rows: np.ndarray) -> dict[str, Any]:
     return {
         "random": apart(again),
         "place": apart(changed((0, 2), 500.0)),
-        "time": apart(changed((-1,), 300.0)),
+        "time": apart(changed((-1,), 1.0)),
         "troubles": [[t.row, t.second, t.words] for t in troubles],
         "sound": float(np.isfinite(first).all(1).mean()),
     }

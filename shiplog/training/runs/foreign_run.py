@@ -57,9 +57,11 @@ def rows_of(frame: pl.DataFrame, profile: Profile) -> np.ndarray:
 
 
 def probe_of(rows: np.ndarray) -> np.ndarray:
-    """Some of them, in disorder."""
+    """Some of them, in disorder, at the beginning of a voyage: what fails later is found later."""
     rng = np.random.default_rng(RANDOM)
-    return rows[rng.choice(len(rows), PROBE_ROWS, replace=len(rows) < PROBE_ROWS)]
+    found = rows[rng.choice(len(rows), PROBE_ROWS, replace=len(rows) < PROBE_ROWS)].copy()
+    found[:, -1] = 0.0
+    return found
 
 
 def bridge(source: Source, profile: Profile, settings: Settings, probe: np.ndarray) -> Bridge:
