@@ -23,13 +23,13 @@ from typing import Any
 import numpy as np
 
 from shiplog.foreign.callables import MOST_TROUBLES, Refused
-from shiplog.foreign.confinement import CALL_S, TooLong, time_limit
 from shiplog.foreign.progress import NOW
 from shiplog.foreign.rows import HEADING, STATES, VELOCITIES, Trouble, apparent
 
 SHORT = 0.02  # s, of an acceleration's steps; an FMU of a fixed inner step takes that one
 STATUS = {1: "warning", 2: "discard", 3: "error", 4: "fatal", 5: "pending"}
 CHANNELS = ("x0", "surge", "y0", "sway", "heading", "yaw_rate")
+STILL = 1e-9  # m/s²: what rounding leaves of an acceleration that is zero
 CLOCK = 0.5  # of a step, by which an FMU's own time may differ
 
 
@@ -91,6 +91,9 @@ class Fmu:
         self.given = [c for c in CHANNELS if c in state]
         self.outputs = _References([by_name[state[c]["output"]] for c in self.given])
         self.output_factors = np.array([state[c]["factor"] for c in self.given])
+        moving = [CHANNELS[i] for i in VELOCITIES]
+        self.velocities = _References([by_name[state[c]["output"]] for c in moving])
+        self.velocity_factors = np.array([state[c]["factor"] for c in moving])
         self.inputs = _References([by_name[i["variable"]] for i in mapping["inputs"]])
         self.input_factors = np.array([i["factor"] for i in mapping["inputs"]])
         self.channels = [i["channel"] for i in mapping["inputs"]]
@@ -106,6 +109,9 @@ class Fmu:
             (v for v in self.told.modelVariables
              if v.causality == "output" and v.name.lower() == "time"), None,
         )  # fmt: skip
+        self.own_time = _References([] if self.clock is None else [self.clock])
+        self.version = int(self.told.fmiVersion.split(".")[0])
+        self.flags = [ctypes.byref(of()) for of in (*[ctypes.c_bool] * 3, ctypes.c_double)]
         self.instance: Any = None
         self.used = False
 
@@ -120,7 +126,7 @@ class Fmu:
         from shiplog.foreign.worker import checked
 
         try:
-            self._begin(rows[0])
+            self._begin_at(rows[0])
         except Stopped as error:
             raise Refused(f"it cannot be started: it {error}") from error
         facts = checked(self, rows)
@@ -140,7 +146,7 @@ class Fmu:
 
     def _moved(self, rows: np.ndarray) -> bool:
         found, _ = self.rates(rows[: min(len(rows), 12)])
-        return bool(np.nanmax(np.nanstd(found, axis=0), initial=0.0) > 0.0)
+        return bool(np.nanmax(np.nanstd(found, axis=0), initial=0.0) > STILL)
 
     def exact(self, rows: np.ndarray) -> None:
         return None
@@ -148,22 +154,24 @@ class Fmu:
     def rates(self, rows: np.ndarray) -> tuple[np.ndarray, list[Trouble]]:
         """ν̇ [n, 3], by two short steps from each row."""
         found, troubles = np.full((len(rows), 3), np.nan), []
-        inputs = self._values(rows)
-        h = self.short
-        for i, row in enumerate(rows):
-            if not np.isfinite(row).all():
-                continue
+        inputs, starts, h = self._values(rows), self._begun(rows), self.short
+        before = rows[:, list(VELOCITIES)]
+        after = np.empty((2, len(rows), 3))
+        for i in np.flatnonzero(np.isfinite(rows).all(1)):
             try:
-                self._begin(row, inputs[i])
-                after = []
+                self._begin(starts[i], inputs[i])
                 for k in range(2):
                     self._advance(k * h, h)
-                    after.append(self._states(row)[list(VELOCITIES)])
-                found[i] = (-3.0 * row[list(VELOCITIES)] + 4.0 * after[0] - after[1]) / (2.0 * h)
-                if not np.isfinite(found[i]).all():
-                    raise Stopped("gave what is no finite number")
-            except (Stopped, TooLong) as error:
-                self._note(troubles, i, row[-1], error)
+                    after[k, i] = self.velocities.get(self)
+                found[i] = 1.0
+            except Stopped as error:
+                self._note(troubles, int(i), rows[i, -1], error)
+        after *= self.velocity_factors
+        found *= (-3.0 * before + 4.0 * after[0] - after[1]) / (2.0 * h)
+        bad = np.isfinite(rows).all(1) & ~np.isfinite(found).all(1)
+        for i in set(np.flatnonzero(bad).tolist()) - {one.row for one in troubles}:
+            error = Stopped("gave what is no finite number")
+            self._note(troubles, i, rows[i, -1], error)
         return found, troubles
 
     def roll(
@@ -176,7 +184,7 @@ class Fmu:
             clock = float(begin[n])
             try:
                 time, x = 0.0, start[n]
-                self._begin(_row(x, driven[n, 0], clock))
+                self._begin_at(_row(x, driven[n, 0], clock))
                 for i in range(dt.shape[1]):
                     count = max(1, math.ceil(float(dt[n, i]) / self.step - 1e-9))
                     h = float(dt[n, i]) / count
@@ -191,7 +199,7 @@ class Fmu:
                         if not np.isfinite(x).all():
                             raise Stopped("gave what is no finite number")
                     states[n, i + 1] = x
-            except (Stopped, TooLong) as error:
+            except Stopped as error:
                 self._note(troubles, n, clock, error)
         finite = np.isfinite(states[..., HEADING])
         turned = np.unwrap(np.where(finite, states[..., HEADING], 0.0), axis=1)
@@ -200,22 +208,24 @@ class Fmu:
 
     def _note(self, troubles: list[Trouble], row: int, second: float, error: Exception) -> None:
         self.used = True
-        words = f"took longer than {CALL_S:g} s" if isinstance(error, TooLong) else str(error)
         if len(troubles) < MOST_TROUBLES:
-            troubles.append(Trouble(row, float(second), words))
+            troubles.append(Trouble(row, float(second), str(error)))
 
     # --- values ---
 
-    def _values(self, rows: np.ndarray) -> np.ndarray:
-        """Of the FMU's inputs [n, inputs], in its units."""
-        found = np.zeros((len(rows), len(self.channels)))
+    def _channels(self, rows: np.ndarray) -> dict[str, np.ndarray]:
+        """What may drive it, SI, by channel."""
         blowing = apparent(rows)
         north, east = rows[:, -3], rows[:, -2]
-        of = {
+        return {
             "wind_speed": blowing[:, 0], "wind_angle": blowing[:, 1], "wind_x0": north,
             "wind_y0": east, "true_wind_speed": np.hypot(north, east),
             "true_wind_direction": np.arctan2(east, north),
         } | {name: rows[:, STATES + i] for i, name in enumerate(self.names)}  # fmt: skip
+
+    def _values(self, rows: np.ndarray) -> np.ndarray:
+        """Of the FMU's inputs [n, inputs], in its units."""
+        found, of = np.zeros((len(rows), len(self.channels))), self._channels(rows)
         for i, channel in enumerate(self.channels):
             found[:, i] = of[channel] / self.input_factors[i]
         return found
@@ -230,22 +240,27 @@ class Fmu:
 
     # --- steps ---
 
-    def _begin(self, row: np.ndarray, inputs: np.ndarray | None = None) -> None:
-        """A start from a row's state. Raises Stopped."""
-        values = self._values(row[None])[0] if inputs is None else inputs
-        by_input = dict(zip(self.channels, values, strict=True))
-        begin = [
-            row[CHANNELS.index(c)] / factor if c in CHANNELS else by_input[c]
-            for c, factor in self.begun
-        ]
-        with time_limit(CALL_S):
-            self._reset()
-            for variable, value in self.parameters:
-                self._parameter(variable, value)
-            self.starts.set(self, begin)
-            self.inputs.set(self, values)
-            self._initialise()
-            self.inputs.set(self, values)
+    def _begun(self, rows: np.ndarray) -> np.ndarray:
+        """What is set before a start [n, starts], in the FMU's units."""
+        columns = {c: rows[:, i] for i, c in enumerate(CHANNELS)}
+        columns |= self._channels(rows)
+        found = np.zeros((len(rows), len(self.begun)))
+        for i, (channel, factor) in enumerate(self.begun):
+            found[:, i] = columns[channel] / factor
+        return found
+
+    def _begin(self, starts: np.ndarray, inputs: np.ndarray) -> None:
+        """A start. Raises Stopped."""
+        self._reset()
+        for variable, value in self.parameters:
+            self._parameter(variable, value)
+        self.starts.set(self, starts)
+        self.inputs.set(self, inputs)
+        self._initialise()
+        self.inputs.set(self, inputs)
+
+    def _begin_at(self, row: np.ndarray) -> None:
+        self._begin(self._begun(row[None])[0], self._values(row[None])[0])
 
     def _reset(self) -> None:
         if self.instance is not None and not self.used:
@@ -256,10 +271,6 @@ class Fmu:
             if good:
                 return
         self._new()
-
-    @property
-    def version(self) -> int:
-        return int(self.told.fmiVersion.split(".")[0])
 
     @property
     def component(self) -> Any:
@@ -309,21 +320,15 @@ class Fmu:
 
     def _advance(self, time: float, step: float) -> None:
         dll = self.instance.dll
-        with time_limit(CALL_S):
-            if self.version == 2:
-                status = dll.fmi2DoStep(self.component, time, step, 1)
-            else:
-                flags = [ctypes.c_bool() for _ in range(3)]
-                last = ctypes.c_double()
-                status = dll.fmi3DoStep(
-                    self.component, time, step, True, *(ctypes.byref(f) for f in flags),
-                    ctypes.byref(last),
-                )  # fmt: skip
+        if self.version == 2:
+            status = dll.fmi2DoStep(self.component, time, step, 1)
+        else:
+            status = dll.fmi3DoStep(self.component, time, step, True, *self.flags)
         if status > 1:
             words = STATUS.get(status, str(status))
             raise Stopped(f"refused the step of {step:g} s ({words})")
         if self.clock is not None:
-            own = float(_References([self.clock]).get(self)[0])
+            own = float(self.own_time.get(self)[0])
             if abs(own - (time + step)) > CLOCK * step + 1e-9:
                 raise Stopped(f"has the time {own:g} s after a step to {time + step:g} s")
 

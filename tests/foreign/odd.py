@@ -33,8 +33,14 @@ def rows(state, inputs, t):
 
 def columns(state, inputs, t):
     """[6, n] or [6]."""
-    return np.stack([one for one in np.moveaxis(rows(np.moveaxis(state, 0, -1),
-                    np.moveaxis(inputs, 0, -1), t), -1, 0)])
+    return np.stack(
+        [
+            one
+            for one in np.moveaxis(
+                rows(np.moveaxis(state, 0, -1), np.moveaxis(inputs, 0, -1), t), -1, 0
+            )
+        ]
+    )
 
 
 def acceleration(state, inputs, t):

@@ -42,9 +42,7 @@ def states(count):
 def test_accelerations_with_causes_are_the_native_ones(both):
     native, theta, foreign, q = both
     rows = np.concatenate((states(7), driven(7)[:, 0]), 1)
-    expected = np.asarray(
-        native.acceleration(theta, rows[:, :6], rows[:, 6:-2], rows[:, -2:])
-    )
+    expected = np.asarray(native.acceleration(theta, rows[:, :6], rows[:, 6:-2], rows[:, -2:]))
     assert foreign_model.values(foreign, q, rows) == pytest.approx(expected, abs=1e-12)
 
 

@@ -386,6 +386,13 @@ class ForeignRun(Run):
     source: Source | None = None
 
     @property
+    def label(self) -> str:
+        if self.extension is None:
+            return super().label
+        causes = listed(c.label for c in self.extension.causes)
+        return f"{self.config.foreign.name} with {causes}"
+
+    @property
     def failures(self) -> tuple[Failure, ...]:
         """Where it failed so far."""
         return tuple(foreign_run.failures(self.config.foreign))
