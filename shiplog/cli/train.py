@@ -128,6 +128,13 @@ Mapping = Annotated[
         "is none.",
     ),
 ]
+SimulatedLogs = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--logs",
+        help="With logs:/TOPIC: the logs that were ingested and hold it, or folders of them.",
+    ),
+]
 WINDOW_OF_SIMULATORS = 100  # s, where --window auto says nothing to a simulator
 
 NO_MODEL = (
@@ -138,7 +145,8 @@ OF_SHEET = (  # those that go with --trial-sheet
     "out", "trial_sheet", "profile", "model", "parameters", "without", "free", "json_to",
 )  # fmt: skip
 OF_SIMULATORS = (  # those that go with a simulator's file
-    "out", "model", "voyages", "validation", "window", "mapping", "store", "json_to", "unchecked",
+    "out", "model", "voyages", "validation", "window", "mapping", "logs", "store", "json_to",
+    "unchecked",
 )  # fmt: skip
 OF_AGAIN = ("out", "again", "store", "json_to")  # parameters that go with --again
 
@@ -165,6 +173,7 @@ def train(
     unchecked: Unchecked = False,
     again: Again = None,
     mapping: Mapping = None,
+    logs: SimulatedLogs = None,
     trial_sheet: TrialSheet = None,
     profile: SheetProfile = None,
     store: StoreOption = STORE,
@@ -225,11 +234,10 @@ def train(
         from shiplog.commands.bars import loading
 
         with loading():
-            from shiplog.commands.train_foreign import foreign_command
+            from shiplog.commands.train_foreign import Given, foreign_command
         size = WINDOW_OF_SIMULATORS if options.window == AUTO_WINDOW else options.window
-        found = foreign_command(
-            model, store, out, options.voyages, options.validation, int(size), mapping, unchecked
-        )
+        given = Given(model, mapping, tuple(logs or ()), unchecked)
+        found = foreign_command(given, store, out, options.voyages, options.validation, int(size))
         answer(found, json_to)
         if not found.complete:
             raise typer.Exit(LOST)

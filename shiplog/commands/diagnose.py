@@ -190,6 +190,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> Diagnosis:
         notes.append(answer.without_nominal(run, store.path))
     if run.given:
         notes.append(answer.of_given(run))
+    notes += run.notes
     cut = trial_voyages.windows_of(run, store, names, profile)
     before = _nominal_windows(of) if nominal is not None else None
     if cut is not None and before is not None:

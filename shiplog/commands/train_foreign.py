@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import logging
 import time
-from dataclasses import replace
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -13,18 +14,19 @@ import polars as pl
 from shiplog.commands.bars import reach, staged
 from shiplog.commands.identify import baseline_losses
 from shiplog.exceptions import ProfileError
-from shiplog.foreign import mapped
+from shiplog.foreign import logged, mapped
 from shiplog.foreign import model as foreign_models
 from shiplog.foreign import source as sources
 from shiplog.foreign.source import Source
 from shiplog.models import mmg
 from shiplog.report.evaluation.foreign_training import ForeignTraining
 from shiplog.report.result import Answer
+from shiplog.ship_profile.profile import Profile
 from shiplog.simulation import prediction_interval, scoring
-from shiplog.simulation.foreign_model import Failure
 from shiplog.training.physics import stand_in
 from shiplog.training.runs import foreign_run, load_model, run_folder
 from shiplog.training.runs.foreign_run import Kept
+from shiplog.training.runs.load_model import ForeignRun, Run
 from shiplog.training.runs.provenance import provenance
 from shiplog.training.settings.run_config import Config, Foreign
 from shiplog.voyages.store.store import Store
@@ -38,28 +40,36 @@ log = logging.getLogger(__name__)
 STAGES = {"opening": 2.0, "simulating": 3.0, "stand-in": 5.0}
 
 
+@dataclass(frozen=True)
+class Given:
+    """What a user gives of a simulator.
+
+    name       FILE.py, FILE.py:NAME, FILE.fmu or logs:/TOPIC
+    mapping    of an FMU; beside it where none is given
+    logs       that hold the topic
+    unchecked  whether a mapping may still say CHECK
+    """
+
+    name: str
+    mapping: Path | None = None
+    logs: tuple[Path, ...] = ()
+    unchecked: bool = False
+
+
 def foreign_command(
-    given: str, store_path: Path, out: Path, voyages: tuple[str, ...],
-    validation: tuple[str, ...], window: int, mapping: Path | None = None,
-    unchecked: bool = False,
+    given: Given, store_path: Path, out: Path, voyages: tuple[str, ...],
+    validation: tuple[str, ...], window: int,
 ) -> Answer:  # fmt: skip
     """Raises ShiplogError."""
-    store, source = Store(store_path), sources.read(given)
+    store, source = Store(store_path), sources.read(given.name)
     split = choose(store, voyages, validation, "ref", window)
     say(split)
-    done = foreign_run_of(source, store, out, split, window, mapping, unchecked)
-    return done.answer(store.path)
+    return foreign_run_of(source, store, out, split, window, given).answer(store.path)
 
 
 @staged("simulator", STAGES)
 def foreign_run_of(
-    source: Source,
-    store: Store,
-    out: Path,
-    split: Split,
-    window: int,
-    mapping: Path | None = None,
-    unchecked: bool = False,
+    source: Source, store: Store, out: Path, split: Split, window: int, given: Given
 ) -> ForeignTraining:
     """The run of a simulator, with what it gets wrong on the voyages that it is good for."""
     began, used = time.time(), [*split.training, *split.validation]
@@ -70,69 +80,93 @@ def foreign_run_of(
     learnt = rows.filter(pl.col("voyage").is_in(split.training))
     held = rows.filter(pl.col("voyage").is_in(split.validation))
     planned = plan(learnt, "ref", window)
-    every = foreign_run.rows_of(learnt, profile)
-    probe = foreign_run.probe_of(every)
-    settings = Foreign(
-        name=source.name, sha256=source.sha256, kind=source.kind,  # type: ignore[arg-type]
-        function=source.function,
-        mapping=mapped.of(source, profile, mapping, unchecked) if source.kind == "fmu" else {},
-    )  # fmt: skip
     reach("opening")
-    bridge = foreign_run.bridge(source, profile, settings, probe)
-    facts = bridge.facts
-    place = facts["place"] > foreign_models.SAME
-    settings = settings.model_copy(
-        update={
-            "returns": facts["returns"], "step": facts["step"], "layout": facts["layout"],
-            "derivatives": foreign_models.derivatives(facts), "place": place,
-        }
-    )  # fmt: skip
+    every = foreign_run.rows_of(learnt, profile)
+    tried = Tried(source, profile, every, given)
+    settings, facts, kept = tried.logged(store) if source.kind == "logged" else tried.asked()
     config = Config(
         model="foreign", data="ref", window=window, seeds=(0,), split=split, foreign=settings
     )
     run = run_folder.create(out, config, profile, None, planned, learnt, held)
-    steps = foreign_models.steps_of(every, place)
-    none = np.zeros(0)
-    kept = Kept(none, np.ones(3), steps, probe)
-    foreign_run.save(run, kept)
+    foreign_run.save(run, kept, tried.states)
     reach("simulating")
-    opened = replace(load_model.of_folder(run, simulators=[_given(source)]))
-    names = (profile.actuator_names, profile.wind_names)
-    cut = windows.cut(learnt, planned, window, *names)
-    simulator = opened.simulator(0)
-    scores = scoring.score(simulator, cut)
+    opened = load_model.of_folder(run, simulators=[given.name])
+    cut = windows.cut(learnt, planned, window, profile.actuator_names, profile.wind_names)
+    scores = scoring.score(opened.simulator(0), cut)
     error = scores.simulated - cut.state
     sound = np.isfinite(error).all((1, 2))
     if sound.any():
-        zero = np.zeros_like(error[sound])
         groups = cut.plan["voyage"].n_unique()
+        zero = np.zeros_like(error[sound])
         run.save_band(prediction_interval.calibrate(error[sound], zero, groups))
     reach("stand-in")
     kept, why = _stood_in(opened, every, kept)
-    foreign_run.save(run, kept)
-    done = run.finish(provenance(store.hashes(used), began))
-    voyage = learnt["voyage"].to_list()[0]
-    noted = [Failure(voyage, second, words) for _, second, words in facts["troubles"]]
+    foreign_run.save(run, kept, tried.states)
+    done = load_model.of_folder(
+        run.finish(provenance(store.hashes(used), began)), simulators=[given.name]
+    )
+    assert isinstance(done, ForeignRun)
     return ForeignTraining(
-        load_model.of_folder(done, simulators=[_given(source)]),
-        facts, scores.errors["loss"].to_numpy(), baseline_losses(cut), kept, why,
-        tuple(dict.fromkeys((*simulator.failures, *noted))),
+        done, facts, scores.errors["loss"].to_numpy(), baseline_losses(cut), kept, why,
+        done.failures,
     )  # fmt: skip
 
 
-def _stood_in(run: load_model.Run, rows: np.ndarray, kept: Kept) -> tuple[Kept, str]:
+class Tried:
+    """A simulator, tried at rows of the ship's.
+
+    states   of one that was logged
+    """
+
+    def __init__(self, source: Source, profile: Profile, rows: np.ndarray, given: Given) -> None:
+        self.source, self.profile, self.rows, self.given = source, profile, rows, given
+        self.states: pl.DataFrame | None = None
+
+    def asked(self) -> tuple[Foreign, dict[str, Any], Kept]:
+        """Of a callable or an FMU. Raises SimulatorError."""
+        source, given, mapping = self.source, self.given, {}
+        if source.kind == "fmu":
+            mapping = mapped.of(source, self.profile, given.mapping, given.unchecked)
+        settings = Foreign(
+            name=source.name, sha256=source.sha256, kind=source.kind,  # type: ignore[arg-type]
+            function=source.function, mapping=mapping,
+        )  # fmt: skip
+        probe = foreign_run.probe_of(self.rows)
+        facts = foreign_run.bridge(source, self.profile, settings, probe).facts
+        place = facts["place"] > foreign_models.SAME
+        found = {
+            "returns": facts["returns"], "step": facts["step"], "layout": facts["layout"],
+            "derivatives": foreign_models.derivatives(facts), "place": place,
+        }  # fmt: skip
+        steps = foreign_models.steps_of(self.rows, place)
+        kept = Kept(np.zeros(0), np.ones(3), steps, probe)
+        return settings.model_copy(update=found), facts, kept
+
+    def logged(self, store: Store) -> tuple[Foreign, dict[str, Any], Kept]:
+        """Of states in logs, of all voyages of the store whose logs were given. Raises
+        SimulatorError."""
+        names = store.select()
+        rows = store.seconds(names, self.profile).select("voyage", "time", "elapsed")
+        self.states = logged.states_of(
+            self.given.logs, self.source.function, rows, store.hashes(names)
+        )
+        settings = Foreign(
+            name=self.source.name, kind="logged", function=self.source.function,
+            sha256=self.source.sha256, returns="states that were logged", layout="logged",
+            derivatives="those of an MMG that was fitted to its accelerations",
+        )  # fmt: skip
+        width = self.rows.shape[1]
+        kept = Kept(np.zeros(0), np.ones(3), np.zeros(width - 1), np.zeros((0, width)))
+        return settings, foreign_models.NOTHING_ODD, kept
+
+
+def _stood_in(run: Run, rows: np.ndarray, kept: Kept) -> tuple[Kept, str]:
     """With the MMG that stands in; else why there is none."""
     try:
         ship = mmg.begin(run.profile, run.config.physics)
     except ProfileError as error:
         return kept, error.message
-    some = rows[:: max(1, len(rows) // stand_in.ROWS)]
-    f = run.simulator(0).model.accelerations(some[:, :6], some[:, 6:-1])
-    found = stand_in.fit(ship.model, ship.start, some[:, :-1], f)
+    assert isinstance(run, ForeignRun)
+    some, f = run.accelerations(rows, stand_in.ROWS)
+    found = stand_in.fit(ship.model, ship.start, some, f)
     return kept._replace(values=found.values, misfit=found.misfit), ""
-
-
-def _given(source: Source) -> str:
-    if source.kind == "logged":
-        return f"{sources.LOGGED}{source.function}"
-    return f"{source.path}:{source.function}" if source.function else str(source.path)

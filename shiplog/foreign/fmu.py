@@ -25,6 +25,7 @@ import numpy as np
 from shiplog.foreign.callables import MOST_TROUBLES, Refused
 from shiplog.foreign.progress import NOW
 from shiplog.foreign.rows import HEADING, STATES, VELOCITIES, Trouble, apparent
+from shiplog.foreign.trying import checked
 
 SHORT = 0.02  # s, of an acceleration's steps; an FMU of a fixed inner step takes that one
 STATUS = {1: "warning", 2: "discard", 3: "error", 4: "fatal", 5: "pending"}
@@ -123,8 +124,6 @@ class Fmu:
 
     def probe(self, rows: np.ndarray) -> dict[str, Any]:
         """What is known of it, once it has been tried at these rows. Raises Refused."""
-        from shiplog.foreign.worker import checked
-
         try:
             self._begin_at(rows[0])
         except Stopped as error:

@@ -83,11 +83,6 @@ def steps_of(rows: np.ndarray, places: bool) -> np.ndarray:
     return steps
 
 
-def facts_of(model: Any) -> dict[str, Any]:
-    """What is known of a model's simulator."""
-    return model.opened().facts
-
-
 # Relative change of accelerations that is no change: single precision leaves 1e-7 of each term, and
 # a difference of terms loses two digits
 SAME = 1e-5
@@ -98,3 +93,10 @@ def derivatives(facts: dict[str, Any]) -> str:
     if facts["differentiated"]:
         return "its own, by JAX" if facts["library"] == "jax" else "its own"
     return f"central differences, {STEP:g} of each input's range either way"
+
+
+# Of one that was logged, and cannot be called
+NOTHING_ODD = {
+    "random": 0.0, "place": 0.0, "time": 0.0, "sound": 1.0, "changes": False, "layout": "logged",
+    "troubles": [],
+}  # fmt: skip

@@ -3,7 +3,7 @@
 import numpy as np
 
 from shiplog.foreign import integrate
-from shiplog.foreign.worker import slopes
+from shiplog.foreign.trying import slopes
 from shiplog.models.mmg import MMG
 
 

@@ -15,7 +15,7 @@ STEP = 0.1
 
 def derivative(state, inputs, t):
     """For one row: `if` of an array raises."""
-    x, u, y, v, psi, r = state
+    _, u, _, v, psi, r = state
     delta, n = inputs[0], inputs[1]
     push = n if n > 0.0 else 0.0
     c, s = math.cos(psi), math.sin(psi)

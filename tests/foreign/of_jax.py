@@ -4,7 +4,7 @@ import jax.numpy as jnp
 
 
 def f(state, inputs, t):
-    x, u, y, v, psi, r = state
+    _, u, _, v, psi, r = state
     delta, n = inputs[0], inputs[1]
     c, s = jnp.cos(psi), jnp.sin(psi)
     return jnp.array([u * c - v * s, jnp.tanh(n) - u, u * s + v * c, -v, r, delta - r])

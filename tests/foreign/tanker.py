@@ -1,7 +1,7 @@
 """A 3 m tanker model as a team of its own would write it: numpy, and nothing of shiplog.
 
-f(state, inputs, t) gives dx/dt of x = (x0, u, y0, v, psi, r) at midship, north and east, SI. Inputs:
-port and starboard rudder [rad], propeller [rev/s], apparent wind speed [m/s] and angle [rad].
+f(state, inputs, t) gives dx/dt of x = (x0, u, y0, v, psi, r) at midship, along north and east, SI.
+Inputs: port and starboard rudder [rad], propeller [rev/s], apparent wind speed [m/s] and angle [rad].
 """
 
 import numpy as np
@@ -19,7 +19,7 @@ def hull(u, v, r):
     x = q * (-straight * u * speed - 0.17 * v * lr)
     y = q * (-0.34 * v * np.abs(u) + 0.10 * lr * u)
     n = q * L * (-0.13 * v * u - 0.065 * lr * np.abs(u))
-    for xi, width in zip(XI, WIDTH):
+    for xi, width in zip(XI, WIDTH, strict=True):
         across = v + lr * xi
         push = q * 0.86 * (1.0 + 4.0 * 0.55 * xi * xi) * width * np.abs(across) * across
         y, n = y - push, n - push * xi * L

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from shiplog.foreign.callables import PythonFunction, Refused
-from shiplog.foreign.worker import Called, checked, slopes
+from shiplog.foreign.trying import checked, slopes
+from shiplog.foreign.worker import Called
 
 HERE = Path(__file__).parent
 ODD = HERE / "odd.py"

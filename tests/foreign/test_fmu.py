@@ -104,7 +104,7 @@ def test_what_is_not_mapped_is_asked_for(tmp_path):
     file.write_text(text, "utf-8")
     with pytest.raises(SimulatorError, match="still says CHECK"):
         mapping.load(file, told, SHIP, False)
-    with pytest.raises(SimulatorError, match="inputs.rudder_port is empty"):
+    with pytest.raises(SimulatorError, match=r"inputs\.rudder_port is empty"):
         mapping.load(file, told, SHIP, True)
     file.write_text(text.replace('variable = ""', 'variable = "-"'), "utf-8")
     assert mapping.load(file, told, SHIP, True)["ignored"] == ["rudder_port"]

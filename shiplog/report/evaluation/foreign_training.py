@@ -43,9 +43,9 @@ class ForeignTraining:
 
     def answer(self, store: Path) -> Answer:
         name = self.run.config.foreign.name
-        given = f"--simulator {name}"
+        given = "" if self.facts["layout"] == "logged" else f"--simulator {name}"
         lines = [
-            *self.lines, f"Next: shiplog evaluate {self.run.path} --store {store} {given}"
+            *self.lines, f"Next: shiplog evaluate {self.run.path} --store {store} {given}".rstrip()
         ]  # fmt: skip
         return Answer(lines, self.json, complete=not self.failures)
 
@@ -62,13 +62,25 @@ class ForeignTraining:
         return [
             f"{of.name} in {run.path}, nothing fitted; {listed(run.config.split.training)}: "
             f"{windows}.",
-            f"It gives the {of.returns}, of {self._how}; SHA-256 {of.sha256[:12]}. The run keeps "
-            "no code of it.",
+            self._what,
             f"{loss}{lost}. Baselines on these windows: {baselines}.",
             f"Sensitivities: {of.derivatives}.",
             self._stand_in,
             *self.remarks,
         ]
+
+    @property
+    def _what(self) -> str:
+        of = self.run.config.foreign
+        if of.kind == "logged":
+            return (
+                "It is of states that were logged: each window begins where the ship was, with "
+                "the velocities that the simulator had."
+            )
+        return (
+            f"It gives the {of.returns}, of {self._how}; SHA-256 {of.sha256[:12]}. The run keeps "
+            "no code of it."
+        )
 
     @property
     def _how(self) -> str:
@@ -96,6 +108,12 @@ class ForeignTraining:
             found.append(
                 f"{name} is not deterministic: the same state and inputs gave accelerations that "
                 f"differ by {facts['random']:.2g} of the largest. All that follows is of one draw."
+            )
+        if facts["sound"] < 1.0:
+            words = facts["troubles"][0][2] if facts["troubles"] else "gave no number"
+            found.append(
+                f"{name} failed at {1.0 - facts['sound']:.0%} of the states at which it was "
+                f"tried: it {words}."
             )
         if facts["changes"]:
             found.append(f"{name} changes its arguments; it was given copies.")

@@ -1,5 +1,6 @@
 """What a run of a simulator of one's own keeps, and how the simulator is opened again.
 
+<run>/seed0/states.parquet         of one that was logged: its states at the seconds of the voyages
 <run>/seed0/stand_in.safetensors   coefficients of the MMG that stands in, its misfit, the steps of
                                    differences, and the rows at which the simulator is tried
 
@@ -19,7 +20,8 @@ from shiplog.exceptions import RunError
 from shiplog.foreign.bridge import Bridge, Ship
 from shiplog.foreign.model import Foreign
 from shiplog.foreign.source import Source
-from shiplog.nomenclature.channels import STATE, WIND
+from shiplog.machine import files
+from shiplog.nomenclature.channels import STATE, VELOCITY_IN_STATE, WIND
 from shiplog.ship_profile.profile import Profile
 from shiplog.simulation.foreign_model import Failure
 from shiplog.simulation.window_series import true_wind
@@ -27,7 +29,7 @@ from shiplog.training.runs.run_folder import RunFolder
 from shiplog.training.settings import run_files
 from shiplog.training.settings.run_config import Foreign as Settings
 
-FILE = "stand_in.safetensors"
+FILE, STATES_FILE = "stand_in.safetensors", "states.parquet"
 PROBE_ROWS = 41  # at which a simulator is tried: no other number of rows is as many as its columns
 RANDOM = 0  # seed of their choice
 
@@ -97,10 +99,39 @@ def kept(folder: RunFolder) -> Kept:
         raise run_files.unreadable(path, error) from error
 
 
-def save(folder: RunFolder, found: Kept) -> None:
+def save(folder: RunFolder, found: Kept, states: pl.DataFrame | None = None) -> None:
+    """`states` of one that was logged."""
     seed = folder.seed(folder.config.seeds[0])
     seed.mkdir(exist_ok=True)
     run_files.save_arrays(seed / FILE, found._asdict())
+    if states is not None:
+        files.write_frame(seed / STATES_FILE, states)
+
+
+def states(folder: RunFolder) -> pl.DataFrame:
+    """voyage, elapsed and the states of a simulator that was logged."""
+    return run_files.table(folder.seed(folder.config.seeds[0]) / STATES_FILE)
+
+
+def logged_accelerations(
+    states: pl.DataFrame, training: pl.DataFrame, profile: Profile
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rows (state, actuators, wind over ground) [n, 6 + A + 2] and ν̇ [n, 3] of a simulator that was
+    logged: ν̇ ≈ (ν(t + 1 s) - ν(t - 1 s)) / 2 s, at the seconds of training voyages."""
+    rows = rows_of(training, profile)
+    key = training.select("voyage", "segment", "elapsed")
+    own = key.join(states, on=["voyage", "elapsed"], how="left", maintain_order="left")
+    state = own.select(c.name for c in STATE).to_numpy().astype(float)
+    velocity = state[:, list(VELOCITY_IN_STATE)]
+    stretch = key.select(pl.struct("voyage", "segment").rank("dense")).to_series().to_numpy()
+    time = rows[:, -1]
+    apart = (time[2:] - time[:-2])[:, None]
+    f = np.full_like(velocity, np.nan)
+    with np.errstate(all="ignore"):
+        f[1:-1] = (velocity[2:] - velocity[:-2]) / apart
+    f[1:-1][(stretch[2:] != stretch[:-2])] = np.nan
+    rows[:, :6] = state
+    return rows[:, :-1], f
 
 
 def model(folder: RunFolder, source: Source | None, error: Callable[[], RunError]) -> Foreign:

@@ -13,6 +13,7 @@ import polars as pl
 
 from shiplog.exceptions import RunError, listed
 from shiplog.foreign import source
+from shiplog.foreign.logged import LoggedSimulator
 from shiplog.foreign.source import Source
 from shiplog.models import FOREIGN, NETWORK, PHYSICS, compiled_network, mmg
 from shiplog.models.causes import Cause
@@ -199,6 +200,11 @@ class Run(RunFolder, ABC):
     def lacks(self) -> str:
         """Why causes that change forces cannot be tested with it; empty where they can."""
         return ""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a diagnosis has to say of how it is judged, in sentences."""
+        return ()
 
     @abstractmethod
     def simulator(self, seed: int) -> Any:
@@ -416,10 +422,46 @@ class ForeignRun(Run):
     def judge(self) -> Base:
         return self.base()
 
-    def simulator(self, seed: int) -> ForeignSimulator:
+    @property
+    def logged(self) -> bool:
+        """Whether its states were logged: it can be asked nothing else."""
+        return self.config.foreign.kind == "logged"
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        of, misfit = self.config.foreign, foreign_run.kept(self).misfit
+        if self.logged:
+            return (
+                f"{of.name} was logged, and cannot be asked at other states: an MMG that was "
+                f"fitted to its accelerations is judged in its stead, and leaves "
+                f"{float(np.median(misfit)):.0%} of them.",
+            )
+        found = [f"Sensitivities of {of.name}: {of.derivatives}."]
+        if not self.lacks:
+            found.append(
+                "Causes that change the ship change an MMG that was fitted to its accelerations, "
+                f"and leaves {float(np.median(misfit)):.0%} of them."
+            )
+        return tuple(found)
+
+    def simulator(self, seed: int) -> Any:
+        if self.logged:
+            return LoggedSimulator(self.config.foreign.name, foreign_run.states(self))
         none = np.zeros(0)
         failures = foreign_run.failures(self.config.foreign)
         return ForeignSimulator(self._model(), none, np.zeros((0, 0)), failures)
+
+    def accelerations(self, rows: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
+        """At so many of the training voyages' rows: (state, actuators, wind) [n, 6 + A + 2], and
+        its ν̇ there [n, 3]."""
+        if self.logged:
+            every, f = foreign_run.logged_accelerations(
+                foreign_run.states(self), self.training(), self.profile
+            )
+            step = max(1, len(every) // most)
+            return every[::step], f[::step]
+        some = rows[:: max(1, len(rows) // most)]
+        return some[:, :-1], self._model().accelerations(some[:, :6], some[:, 6:-1])
 
     def spread(self, models: Mapping[int, Any], simulated: list[np.ndarray], cut: Windows) -> Any:
         return next(iter(models.values())).spread(cut)
@@ -434,13 +476,18 @@ class ForeignRun(Run):
         )
 
     def _numbers(self, seed: int) -> tuple[Any, np.ndarray, np.ndarray]:
-        return self._model(), np.zeros(0), np.zeros((0, 0))
+        model, start, _, _ = self._plain_base()
+        return model, start.values, np.zeros((len(start.values),) * 2)
 
     def _plain_base(self) -> Base:
-        none = np.zeros(0)
         ship = mmg.begin(self.profile, self.config.physics)
         values = foreign_run.kept(self).values
         values = values if len(values) else ship.start.values
+        if self.logged:
+            held = np.full(len(values), HELD_SPREAD)
+            start = Start(values, held, ship.start.low, ship.start.high)
+            return Base(ship.model, start, ship.model, values)
+        none = np.zeros(0)
         return Base(self._model(), Start(none, none, none, none), ship.model, values)
 
     def _with_coefficients(self, plain: Base, coefficients: np.ndarray) -> Base:

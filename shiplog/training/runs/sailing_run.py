@@ -409,6 +409,11 @@ def _physics(run: Sails, seed: int) -> _Physics | None:
         return _Physics(found.model, found.theta, found.covariance, 1)
     if run.judges_itself:
         own = run.simulator(seed)
+        if not hasattr(own, "model"):
+            raise ModelError(
+                f"{run.name} is of states that were logged, and cannot be sailed on other orders.",
+                hint="give the simulator itself: shiplog train --model FILE.py or FILE.fmu.",
+            )
         return _Physics(own.model, own.theta, own.covariance, 0)
     return None
 
