@@ -57,5 +57,7 @@ def evaluate(
     found = evaluate_runs(runs, Store(store), voyages or [], cause or [], simulator or [])
     answer(found, json_to)
     leave_lost([*save(found), *keep_pages(found, Store(store), page)])
+    if any(run.failures for run in found.runs):
+        raise typer.Exit(LOST)
     if set(found.too_short) & set(voyages or ()):  # by its own name, and the answer says so
         raise typer.Exit(LOST)

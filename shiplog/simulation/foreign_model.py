@@ -14,6 +14,7 @@ with (a, b) = Rᵀ(ψ) V,
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -160,8 +161,17 @@ class Failure:
     second: float
     words: str
 
-    def sentence(self, name: str) -> str:
-        return f"{name} {self.words}, at {self.second:.1f} s of {self.voyage}."
+
+def sentences(name: str, failures: Iterable[Failure]) -> list[str]:
+    """One for each kind of failure in each voyage: when it first happened, and how often."""
+    found: dict[tuple[str, str], list[float]] = {}
+    for one in failures:
+        found.setdefault((one.voyage, one.words), []).append(one.second)
+    return [
+        f"{name} {words}, at {min(seconds):.1f} s of {voyage}"
+        + (f" and {len(seconds) - 1} more times." if len(seconds) > 1 else ".")
+        for (voyage, words), seconds in found.items()
+    ]
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """A 3 m tanker model as a team of its own would write it: numpy, and nothing of shiplog.
 
 f(state, inputs, t) gives dx/dt of x = (x0, u, y0, v, psi, r) at midship, along north and east, SI.
-Inputs: port and starboard rudder [rad], propeller [rev/s], apparent wind speed [m/s] and angle [rad].
+Inputs: rudders to port and starboard [rad], propeller [rev/s], apparent wind [m/s, rad].
 """
 
 import numpy as np

@@ -19,12 +19,16 @@ from shiplog.report.evaluation import trust as trusted
 from shiplog.report.evaluation.judgement import MEANING, Judgement, force_line, judge
 from shiplog.report.result import Shown, Shows
 from shiplog.simulation.better_model import Better
+from shiplog.simulation.foreign_model import sentences
 from shiplog.simulation.residual_tests import ResidualTest
 from shiplog.training.physics.trust import CoefficientTrust
 from shiplog.training.runs.load_model import Run
 from shiplog.voyages.store import contradicted
 from shiplog.voyages.store.contradicted import Contradicted
 from shiplog.voyages.windows.ship_time import ShipTime
+
+
+MOST_FAILURES = 5  # of a simulator, that are listed
 
 
 @dataclass(frozen=True)
@@ -213,6 +217,7 @@ class Evaluation(Shows):
                 "band_90": dict(shares.iter_rows()),
                 "winds": tables.winds(errors).drop("run").to_dicts(),
                 "trust": [one.as_json() for one in self.trust.get(run.name, ())],
+                "failures": [asdict(one) for one in run.failures],
                 "residual_tests": [one.as_json() for one in self.residual_tests.get(run.name, ())],
             }
             | self._as_derived
@@ -232,6 +237,10 @@ class Evaluation(Shows):
     def _seconds(self) -> float:
         """Of a window, from its first sample to its last."""
         return self.runs[0].config.window - 1.0
+
+    def failed(self, run: Run) -> list[str]:
+        """Where a simulator of the user's own failed, in sentences; the first of them."""
+        return sentences(run.config.foreign.name, run.failures)[:MOST_FAILURES]
 
     @property
     def window_advice(self) -> str:
@@ -276,6 +285,7 @@ class Evaluation(Shows):
         lines = [
             *([self.warning] if self.warning else []),
             *[self.judgement(run).sentence for run in self.runs],
+            *[one for run in self.runs for one in self.failed(run)],
             *trusted.better_lines(self.better),
             *([self.window_advice] if self.window_advice else []),
             *([said] if (said := derived.loss_sentence(self.derived, self._seconds)) else []),

@@ -15,7 +15,7 @@ from shiplog.nomenclature.contract import CONTRACT
 from shiplog.nomenclature.numbers import counted
 from shiplog.report.evaluation.judgement import BASELINES
 from shiplog.report.result import Answer
-from shiplog.simulation.foreign_model import Failure
+from shiplog.simulation.foreign_model import Failure, sentences
 from shiplog.training.runs.foreign_run import Kept
 from shiplog.training.runs.load_model import Run
 
@@ -123,9 +123,7 @@ class ForeignTraining:
             )
         if facts["place"] > SAME:
             found.append(f"{name} depends on where the ship is.")
-        found += [one.sentence(name) for one in self.failures[:MOST]]
-        if len(self.failures) > MOST:
-            found.append(f"It failed {len(self.failures) - MOST} more times.")
+        found += sentences(name, self.failures)[:MOST]
         return found
 
     @property

@@ -206,6 +206,11 @@ class Run(RunFolder, ABC):
         """What a diagnosis has to say of how it is judged, in sentences."""
         return ()
 
+    @property
+    def failures(self) -> tuple[Failure, ...]:
+        """Where a simulator of the user's own failed so far; of all others, nowhere."""
+        return ()
+
     @abstractmethod
     def simulator(self, seed: int) -> Any:
         """What can be simulated, without an extension."""
