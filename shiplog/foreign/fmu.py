@@ -83,7 +83,7 @@ class Fmu:
             fmpy.extract(str(path), unzipdir=self.folder)
         except Exception as error:
             raise Refused(f"it cannot be opened: {_first(error)}") from error
-        self.step = float(mapping["step"])
+        self.step, self.hold = float(mapping["step"]), bool(mapping["hold"])
         inner = getattr(self.told.coSimulation, "fixedInternalStepSize", None)
         self.short = float(inner) if inner else min(SHORT, self.step)
         by_name = {v.name: v for v in self.told.modelVariables}
@@ -188,7 +188,8 @@ class Fmu:
                     count = max(1, math.ceil(float(dt[n, i]) / self.step - 1e-9))
                     h = float(dt[n, i]) / count
                     for k in range(count):
-                        now = driven[n, i] + (k + 0.5) / count * (driven[n, i + 1] - driven[n, i])
+                        part = 0.0 if self.hold else (k + 0.5) / count
+                        now = driven[n, i] + part * (driven[n, i + 1] - driven[n, i])
                         row = _row(x, now, clock)
                         NOW.at(clock)
                         self.inputs.set(self, self._values(row[None])[0])

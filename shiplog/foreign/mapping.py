@@ -2,6 +2,7 @@
 
     [simulator]
     step_s = 0.1                     # communication step
+    between = "straight"             # two seconds, inputs go so; or "hold": as the first has them
 
     [state.surge]
     output = "u"                     # what it gives
@@ -38,6 +39,7 @@ from shiplog.ship_profile.profile import Profile
 from shiplog.ship_profile.unchecked_lines import unchecked_lines
 
 STEP_S = 0.1  # s: a tenth of the rows; a ship of metres turns in seconds
+BETWEEN = ("straight", "hold")
 NONE = "-"  # instead of a variable that there is none of
 # What a channel measures, the unit that shiplog has it in, and names under which it goes, without
 # what is no letter or digit
@@ -122,6 +124,8 @@ def draft(of: Description, profile: Profile) -> str:
         "", "[simulator]",
         f"step_s = {step:g}" + ("" if of.step else "  # CHECK communication step"),
     ]  # fmt: skip
+    if of.tool.startswith("shiplog"):  # its coefficients were fitted to inputs that are held
+        lines.append('between = "hold"')
     for channel, (_, unit, names) in STATE.items():
         output = of.named((channel, *names), "output") or of.named((channel, *names), "local")
         start = _start(of, (channel, *names), output)
@@ -219,6 +223,12 @@ def _resolved(
                 f"{nearest(channel, [*profile.actuator_names, *WIND])}.",
                 hint=f"there are {listed([*profile.actuator_names, *WIND])}.",
             )
+    between = content.get("simulator", {}).get("between", BETWEEN[0])
+    if between not in BETWEEN:
+        raise SimulatorError(
+            f"{path}: between is {str(between)!r}{nearest(str(between), BETWEEN)}.",
+            hint=f"give {listed(BETWEEN)}.",
+        )
     step = float(content.get("simulator", {}).get("step_s", STEP_S))
     if not 0.0 < step <= 1.0:
         raise SimulatorError(f"{path}: step_s is {step:g}.", hint="give 0.001 to 1 s.")
@@ -226,7 +236,7 @@ def _resolved(
     return {
         "step": step, "state": states, "inputs": inputs, "ignored": ignored,
         "parameters": parameters, "actuators": list(profile.actuator_names),
-        "internal_step": of.step,
+        "hold": between == "hold",
     }  # fmt: skip
 
 

@@ -116,10 +116,14 @@ def answered(
         found, troubles = simulator.rates(arrays[0])
         return [found], troubles
     if do == "slopes":
-        return slopes(simulator, *arrays)
+        rows, steps = arrays
+        return slopes(simulator, rows, steps)
     if do == "along":
-        *given, step = arrays
-        states, troubles = integrate.along(simulator.rates, *given, float(step[0]))
-        return [states], troubles
-    states, troubles = simulator.roll(*arrays)
+        start, acceleration, driven, step = arrays
+        states, troubles = integrate.along(
+            simulator.rates, start, acceleration, driven, float(step[0])
+        )
+    else:
+        start, driven, dt, begin = arrays
+        states, troubles = simulator.roll(start, driven, dt, begin)
     return [states], troubles

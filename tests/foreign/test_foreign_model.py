@@ -92,8 +92,9 @@ def test_segments_are_the_native_ones(both, fouled):
     moved = (np.array([[0, 2]]), np.full((S, 1, K), 0.3), 3)
     given = (states(S), push, driven(S), hats, STEP, BINS, moved)
     expected = paths.columns(native, theta, *given)
-    assert expected is not None
+    assert expected is not None and expected[2] is not None
     y, z, j = foreign_paths.columns(foreign, q, *given)
+    assert j is not None
     assert y == pytest.approx(expected[0], abs=2e-4)
     scale = np.abs(expected[1]).max((0, 1), keepdims=True) + 1e-9
     assert (z - expected[1]) / scale == pytest.approx(0.0, abs=2e-3)

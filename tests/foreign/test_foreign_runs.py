@@ -43,7 +43,8 @@ def store(tmp_path_factory):
         rng = np.random.default_rng(number)
         for one in parts.values():
             for column, values in one.columns.items():
-                one.columns[column] = values + rng.normal(0, 1e-3, len(values))
+                noise = rng.normal(0, 1e-3, len(values))
+                one.columns[column] = values + noise  # type: ignore[index]  # a dict
         truth = sailing.circle(130.0, 0.0)
         parts[TOPIC] = Series(TOPIC, "shiplog.ShipState", sailing.stamps(truth["t"]), {
             "x0_m": truth["x0"] + 300.0, "y0_m": truth["y0"], "surge_mps": 0.85 + 0.0 * truth["t"],

@@ -27,7 +27,6 @@ from shiplog.voyages.store import contradicted
 from shiplog.voyages.store.contradicted import Contradicted
 from shiplog.voyages.windows.ship_time import ShipTime
 
-
 MOST_FAILURES = 5  # of a simulator, that are listed
 
 
