@@ -26,7 +26,7 @@ from shiplog.cli.output import LOST, answer
 from shiplog.exceptions import UsageError, listed
 from shiplog.foreign.source import recognised
 from shiplog.models import FORCES, FOREIGN, MODELS, PHYSICS
-from shiplog.nomenclature.channels import AUTO_WINDOW
+from shiplog.nomenclature.channels import AUTO_WINDOW, WINDOW
 from shiplog.voyages.windows.augmentation import AUGMENTATIONS
 
 OWN = [name for name, kind in MODELS.items() if kind.family is not FOREIGN]
@@ -135,7 +135,7 @@ SimulatedLogs = Annotated[
         help="With logs:/TOPIC: the logs that were ingested and hold it, or folders of them.",
     ),
 ]
-WINDOW_OF_SIMULATORS = 100  # s, where --window auto says nothing to a simulator
+
 
 NO_MODEL = (
     "No --model is given: this trains {model}, the paper's network. To begin with a ship, take "
@@ -235,7 +235,7 @@ def train(
 
         with loading():
             from shiplog.commands.train_foreign import Given, foreign_command
-        size = WINDOW_OF_SIMULATORS if options.window == AUTO_WINDOW else options.window
+        size = WINDOW if options.window == AUTO_WINDOW else options.window
         given = Given(model, mapping, tuple(logs or ()), unchecked)
         found = foreign_command(given, store, out, options.voyages, options.validation, int(size))
         answer(found, json_to)

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from shiplog.exceptions import ShiplogError
+from shiplog.nomenclature.channels import WINDOW
 from shiplog.voyages.store.store import Store
 from shiplog.voyages.store.voyage import Voyage
 
@@ -154,12 +155,15 @@ def train(
     without: Words = (),
     free: Words = (),
     folds: int | None = None,
+    mapping: str | Path | None = None,
+    logs: Files = (),
 ) -> Run:
     """A model of the voyages, as the run folder `out`.
 
         shiplog.train(store, "runs/mmg", model="mmg", voyages=["june_*"])
 
-    model        which dynamic model: feedforward, mmg or hybrid; begin with mmg
+    model        which dynamic model: feedforward, mmg or hybrid; begin with mmg. Or the file of a
+                 simulator of your own: FILE.py, FILE.fmu, or logs:/TOPIC
     data         the paper's window set: ref, sli2, ..., d-ref
     voyages      names or shell patterns of the voyages to learn from; all where there are none
     validation   those to validate on
@@ -181,13 +185,22 @@ def train(
     free         patterns of the coefficients to identify, such as wind.*; all where there are none
     folds        parts in which voyages are held out in turn, 5 unless given; below 2 none is
 
+    Of a simulator of your own:
+    mapping      of an FMU: TOML that says which of its variables is which channel
+    logs         that hold its states, of logs:/TOPIC
+
     Raises ShiplogError for voyages that cannot be trained on, for options that exclude each other
     and for a folder that is taken.
     """
     from shiplog.commands.train import train_command
+    from shiplog.foreign.source import recognised
     from shiplog.training.runs import load_model
     from shiplog.training.settings.options import TrainOptions
 
+    if recognised(model):
+        return _simulator(
+            store, Path(out), model, voyages, validation, window, unchecked, mapping, logs
+        )
     options = TrainOptions(
         model=model, data=data, voyages=tuple(_names(voyages)),
         validation=tuple(_names(validation)), seeds=seeds, window=window, unchecked=unchecked,
@@ -198,6 +211,22 @@ def train(
     into = Path(out)
     train_command(_path(store), into, options)
     return load_model.load(into)
+
+
+def _simulator(
+    store: AnyStore, out: Path, model: str, voyages: Names, validation: Names,
+    window: int | str, unchecked: bool, mapping: str | Path | None, logs: Files,
+) -> Run:  # fmt: skip
+    """The run of a simulator of the user's own."""
+    from shiplog.commands.train_foreign import Given, foreign_command
+    from shiplog.training.runs import load_model
+
+    to = None if mapping is None else Path(mapping)
+    given = Given(model, to, tuple(_files(logs)), unchecked)
+    size = window if isinstance(window, int) else WINDOW
+    chosen = tuple(_names(voyages)), tuple(_names(validation))
+    foreign_command(given, _path(store), out, *chosen, size)
+    return load_model.load(out, simulators=[model])
 
 
 def load(path: str | Path, causes: Files = (), *, simulators: Files = ()) -> Run:

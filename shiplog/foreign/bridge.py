@@ -28,6 +28,7 @@ log = logging.getLogger(__name__)
 
 PATIENCE_S = 180.0  # s without an answer, after which a child is ended by force
 OPENING_S = 300.0  # the same of its start: torch or JAX is imported
+MOST_LETTERS = 300  # of what a simulator says of a failure
 RESTARTS = 20  # of children that ended, in one call; more is no simulator
 ROWS_AT_A_TIME = 4096  # of a request: tens of megabytes with their differences
 SLOW_ROWS = 64  # of a simulator that is asked row by row: fewer are not worth a second process
@@ -101,7 +102,7 @@ class Bridge:
             process.join()
         if "refused" in answer:
             raise SimulatorError(
-                f"{source.name} cannot be used: {answer['refused']}.",
+                f"{source.name} cannot be used: {_inert(answer['refused'])}.",
                 hint="mend that, and give the same command again.",
             )
         return answer["facts"]
@@ -201,7 +202,7 @@ class Bridge:
                 self._answer(number, there, do, some, by_row, found)
             return
         for row, second, words in head.get("troubles", ()):
-            self._note(Trouble(part.start + int(row), float(second), str(words)[:300]))
+            self._note(Trouble(part.start + int(row), float(second), _inert(str(words))))
         for whole, values in zip(found, arrays, strict=True):
             if values.shape != whole[part].shape:
                 raise SimulatorError(
@@ -243,7 +244,7 @@ class Bridge:
         if "refused" in answer:
             new.end()
             raise SimulatorError(
-                f"{self.source.name} cannot be used: {answer['refused']}.",
+                f"{self.source.name} cannot be used: {_inert(answer['refused'])}.",
                 hint="mend that, and give the same command again.",
             )
         if self._facts is None:
@@ -255,7 +256,7 @@ class Bridge:
     def _received(self, number: int, patience: float) -> tuple[dict[str, Any], list[np.ndarray]]:
         head, arrays = _received(self._children[number].pipe, patience)
         if "refused" in head:
-            raise _Ended(head["refused"])
+            raise _Ended(_inert(head["refused"]))
         return head, arrays
 
     def _restart(self, number: int) -> None:
@@ -285,3 +286,8 @@ def _received(pipe: Connection, patience: float) -> tuple[dict[str, Any], list[n
         raise _Ended("ended its process") from error
     except (ValueError, KeyError, TypeError) as error:
         raise _Ended("gave an answer that cannot be read") from error
+
+
+def _inert(words: str) -> str:
+    """A stranger's words on one line, without what a terminal would act on."""
+    return "".join(c if c.isprintable() else " " for c in words)[:MOST_LETTERS]

@@ -88,6 +88,14 @@ def absent(run: str, name: str, sha256: str) -> SimulatorError:
     )
 
 
+def not_again(run: str, name: str) -> SimulatorError:
+    return SimulatorError(
+        f"{run} is a run of the simulator {name}, which is taken as it is: there is nothing to "
+        "train again.",
+        hint="give shiplog train --model and the path of the simulator.",
+    )
+
+
 def _split(given: str) -> tuple[Path, str]:
     """Path and function of FILE.py:NAME."""
     whole, _, name = given.rpartition(":")

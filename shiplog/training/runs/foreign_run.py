@@ -10,6 +10,7 @@ One simulator has its child processes once, however many runs and copies of runs
 from __future__ import annotations
 
 import atexit
+import json
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -69,7 +70,8 @@ def probe_of(rows: np.ndarray) -> np.ndarray:
 def bridge(source: Source, profile: Profile, settings: Settings, probe: np.ndarray) -> Bridge:
     """The children of this simulator for this ship."""
     names = tuple(profile.actuator_names)
-    key = (source.sha256, source.function, names, profile.has_wind)
+    mapped = json.dumps(settings.mapping, sort_keys=True)
+    key = (source.sha256, source.function, names, profile.has_wind, mapped)
     if key not in _bridges:
         ship = Ship(names, profile.has_wind)
         _bridges[key] = Bridge(source, ship, settings.mapping, probe)
