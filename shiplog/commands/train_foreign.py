@@ -100,7 +100,8 @@ def foreign_run_of(
         zero = np.zeros_like(error[sound])
         run.save_band(prediction_interval.calibrate(error[sound], zero, groups))
     reach("stand-in")
-    kept, why = _stood_in(opened, every, kept)
+    most = int(min(stand_in.ROWS, stand_in.PATIENCE_S / max(facts["seconds"], 1e-9)))
+    kept, why = _stood_in(opened, every, kept, most)
     foreign_run.save(run, kept, tried.states)
     done = load_model.of_folder(
         run.finish(provenance(store.hashes(used), began)), simulators=[given.name]
@@ -160,13 +161,13 @@ class Tried:
         return settings, foreign_models.NOTHING_ODD, kept
 
 
-def _stood_in(run: Run, rows: np.ndarray, kept: Kept) -> tuple[Kept, str]:
-    """With the MMG that stands in; else why there is none."""
+def _stood_in(run: Run, rows: np.ndarray, kept: Kept, most: int) -> tuple[Kept, str]:
+    """From so many rows, with the MMG that stands in; else why there is none."""
     try:
         ship = mmg.begin(run.profile, run.config.physics)
     except ProfileError as error:
         return kept, error.message
     assert isinstance(run, ForeignRun)
-    some, f = run.accelerations(rows, stand_in.ROWS)
+    some, f = run.accelerations(rows, most)
     found = stand_in.fit(ship.model, ship.start, some, f)
     return kept._replace(values=found.values, misfit=found.misfit), ""

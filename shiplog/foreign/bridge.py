@@ -27,6 +27,8 @@ from shiplog.machine import child as children
 log = logging.getLogger(__name__)
 
 PATIENCE_S = 180.0  # s without an answer, after which a child is ended by force
+PATIENCE_PART = 0.2  # of it, that a request should take
+STEPS_OF_A_SECOND = 20  # of a rollout, each as long as an acceleration
 OPENING_S = 300.0  # the same of its start: torch or JAX is imported
 MOST_LETTERS = 300  # of what a simulator says of a failure
 RESTARTS = 20  # of children that ended, in one call; more is no simulator
@@ -158,7 +160,13 @@ class Bridge:
         count = len(by_row[0])
         least = 1 if do == "roll" else SLOW_ROWS
         many = min(CHILDREN, max(1, count // least)) if self._slow else 1
-        size = min(ROWS_AT_A_TIME, max(1, -(-count // many)))
+        # of a slow one only as many as it answers within a part of the patience
+        each = self.facts["seconds"] * {
+            "rates": 1, "slopes": 2 * by_row[0].shape[-1], "along": by_row[-1].shape[1],
+            "roll": STEPS_OF_A_SECOND * by_row[1].shape[1] if do == "roll" else 0,
+        }[do]  # fmt: skip
+        soon = int(PATIENCE_PART * PATIENCE_S / max(each, 1e-9))
+        size = min(ROWS_AT_A_TIME, max(1, soon), max(1, -(-count // many)))
         parts = [slice(at, min(at + size, count)) for at in range(0, count, size)]
         found = [np.full((count, *shape), np.nan) for shape in shapes]
         for at in range(0, len(parts), many):

@@ -97,6 +97,6 @@ def derivatives(facts: dict[str, Any]) -> str:
 
 # Of one that was logged, and cannot be called
 NOTHING_ODD = {
-    "random": 0.0, "place": 0.0, "time": 0.0, "sound": 1.0, "changes": False, "layout": "logged",
-    "troubles": [],
+    "seconds": 0.0, "random": 0.0, "place": 0.0, "time": 0.0, "sound": 1.0, "changes": False,
+    "layout": "logged", "troubles": [],
 }  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from typing import Any, Protocol
 
@@ -22,7 +23,9 @@ class Simulator(Protocol):
 
 def checked(simulator: Simulator, rows: np.ndarray) -> dict[str, Any]:
     """Whether it is deterministic, and what its accelerations depend on besides velocities."""
+    began = time.perf_counter()
     first, troubles = simulator.rates(rows)
+    seconds = (time.perf_counter() - began) / max(len(rows), 1)
     again, _ = simulator.rates(rows)
     scale = np.nanmax(np.abs(first), axis=0, initial=0.0) + 1e-12
 
@@ -36,6 +39,7 @@ def checked(simulator: Simulator, rows: np.ndarray) -> dict[str, Any]:
         return simulator.rates(moved)[0]
 
     return {
+        "seconds": seconds,
         "random": apart(again),
         "place": apart(changed((0, 2), 500.0)),
         "time": apart(changed((-1,), 1.0)),

@@ -12,13 +12,15 @@ import numpy as np
 from shiplog.exceptions import listed
 from shiplog.foreign.model import SAME
 from shiplog.nomenclature.contract import CONTRACT
-from shiplog.nomenclature.numbers import counted
+from shiplog.nomenclature.numbers import counted, figure
 from shiplog.report.evaluation.judgement import BASELINES
 from shiplog.report.result import Answer
 from shiplog.simulation.foreign_model import Failure, sentences
 from shiplog.training.runs.foreign_run import Kept
 from shiplog.training.runs.load_model import Run
 
+SLOW_S = 0.002  # s for an acceleration, from which on a diagnosis takes hours
+OF_A_DIAGNOSIS = 4e6  # accelerations that a diagnosis of half an hour asks for, with differences
 MOST = 5  # failures that are listed
 
 
@@ -108,6 +110,12 @@ class ForeignTraining:
             found.append(
                 f"{name} is not deterministic: the same state and inputs gave accelerations that "
                 f"differ by {facts['random']:.2g} of the largest. All that follows is of one draw."
+            )
+        if facts["seconds"] > SLOW_S:
+            hours = facts["seconds"] * OF_A_DIAGNOSIS / 3600.0
+            found.append(
+                f"{name} takes {figure(facts['seconds'])} s for an acceleration: a diagnosis of "
+                f"half an hour would take about {figure(hours)} h."
             )
         if facts["sound"] < 1.0:
             words = facts["troubles"][0][2] if facts["troubles"] else "gave no number"

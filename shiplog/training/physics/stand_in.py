@@ -23,6 +23,7 @@ from shiplog.simulation.kernel import rollouts
 
 MISFIT = 0.05  # of the acceleration: an MMG describes a ship to some hundredths
 ROWS = 1500  # of the training voyages, at most: fifty for each coefficient
+PATIENCE_S = 60.0  # s for these rows: of a slow simulator there are fewer
 ROUNDS = 25  # of Gauss-Newton, damped or not
 # Root mean square of what the stand-in leaves of the acceleration, over its root mean square, from
 # which on it is not of this ship: a change of it would not be a change of the simulator
