@@ -161,10 +161,7 @@ class Bridge:
         least = 1 if do == "roll" else SLOW_ROWS
         many = min(CHILDREN, max(1, count // least)) if self._slow else 1
         # of a slow one only as many as it answers within a part of the patience
-        each = self.facts["seconds"] * {
-            "rates": 1, "slopes": 2 * by_row[0].shape[-1], "along": by_row[-1].shape[1],
-            "roll": STEPS_OF_A_SECOND * by_row[1].shape[1] if do == "roll" else 0,
-        }[do]  # fmt: skip
+        each = self.facts["seconds"] * _accelerations(do, by_row)
         soon = int(PATIENCE_PART * PATIENCE_S / max(each, 1e-9))
         size = min(ROWS_AT_A_TIME, max(1, soon), max(1, -(-count // many)))
         parts = [slice(at, min(at + size, count)) for at in range(0, count, size)]
@@ -299,3 +296,12 @@ def _received(pipe: Connection, patience: float) -> tuple[dict[str, Any], list[n
 def _inert(words: str) -> str:
     """A stranger's words on one line, without what a terminal would act on."""
     return "".join(c if c.isprintable() else " " for c in words)[:MOST_LETTERS]
+
+
+def _accelerations(do: str, by_row: Sequence[np.ndarray]) -> int:
+    """How many accelerations a row of a request takes."""
+    if do == "roll":
+        return STEPS_OF_A_SECOND * by_row[1].shape[1]
+    if do == "along":
+        return by_row[2].shape[1]
+    return 2 * by_row[0].shape[1] if do == "slopes" else 1
