@@ -10,7 +10,8 @@ without network, and only where its path was given by hand in this call. Here it
 | `source` | name, kind and SHA-256 of a simulator's file |
 | `mapping` | the TOML that says which of its variables is which channel |
 | `confinement`, `worker` | in the child: limits, and the answers to requests |
-| `callables`, `fmu` | in the child: a Python function, an FMU by FMPy |
+| `callables` | in the child: a Python function |
+| `fmu`, `exchange` | in the child: an FMU by FMPy, for co-simulation or model exchange |
 | `bridge` | here: the child's other end |
 | `model` | here: what the rest of shiplog asks of it, as of any model without coefficients |
 

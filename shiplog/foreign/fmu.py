@@ -45,8 +45,11 @@ def description(path: Path) -> dict[str, Any]:
         found = fmpy.read_model_description(str(path), validate=False)
     except Exception as error:
         raise Refused(f"its model description cannot be read: {_first(error)}") from error
-    if found.coSimulation is None:
-        raise Refused("it is not for co-simulation; export it as FMI 2.0 or 3.0 for co-simulation")
+    exchange = found.modelExchange is not None and found.fmiVersion.startswith("2.")
+    if found.coSimulation is None and not exchange:
+        raise Refused(
+            "it is neither for co-simulation (FMI 2.0 or 3.0) nor for model exchange (FMI 2.0)"
+        )
     if not found.fmiVersion.startswith(("2.", "3.")):
         raise Refused(f"it is of FMI {found.fmiVersion}; export it as FMI 2.0 or 3.0")
     variables = []
@@ -69,6 +72,7 @@ def description(path: Path) -> dict[str, Any]:
     return {
         "name": path.name, "version": found.fmiVersion, "tool": found.generationTool or "",
         "step": min(float(step), 1.0), "variables": variables,
+        "exchange": found.coSimulation is None,
     }  # fmt: skip
 
 
@@ -278,9 +282,6 @@ class Fmu:
 
     def _new(self) -> None:
         """Another instance: the first, or after a failure."""
-        from fmpy.fmi2 import FMU2Slave
-        from fmpy.fmi3 import FMU3Slave
-
         if self.instance is not None:
             with contextlib.suppress(Exception):
                 self.instance.fmi2FreeInstance(self.component) if self.version == 2 else (
@@ -288,15 +289,23 @@ class Fmu:
                 )
         try:
             if self.instance is None:
-                kind = FMU2Slave if self.version == 2 else FMU3Slave
+                kind, identifier = self._kind()
                 self.instance = kind(
                     guid=self.told.guid, unzipDirectory=self.folder, instanceName="shiplog",
-                    modelIdentifier=self.told.coSimulation.modelIdentifier,
+                    modelIdentifier=identifier,
                 )  # fmt: skip
             self.instance.instantiate()
         except Exception as error:
             raise Stopped(f"cannot be made an instance of: {_first(error)}") from error
         self.used = False
+
+    def _kind(self) -> Any:
+        """FMPy's class, and the library's name."""
+        from fmpy.fmi2 import FMU2Slave
+        from fmpy.fmi3 import FMU3Slave
+
+        identifier = self.told.coSimulation.modelIdentifier
+        return (FMU2Slave if self.version == 2 else FMU3Slave), identifier
 
     def _initialise(self) -> None:
         dll = self.instance.dll

@@ -97,11 +97,13 @@ class Description:
     tool: str
     step: float
     variables: tuple[Variable, ...]
+    exchange: bool = False  # for model exchange, and not for co-simulation
 
     @classmethod
     def from_record(cls, facts: Mapping[str, Any]) -> Description:
         variables = tuple(Variable(**one) for one in facts["variables"])
-        return cls(facts["name"], facts["version"], facts["tool"], facts["step"], variables)
+        plain = (facts[key] for key in ("name", "version", "tool", "step"))
+        return cls(*plain, variables, facts["exchange"])
 
     def named(self, names: Iterable[str], *causalities: str) -> Variable | None:
         """The first variable that goes under one of these names."""
@@ -117,12 +119,13 @@ class Description:
 def draft(of: Description, profile: Profile) -> str:
     """A mapping's TOML; what it is not sure of says CHECK."""
     step = of.step or STEP_S
+    told = bool(of.step) or of.exchange  # which takes no steps
     lines = [
         f"# Which variables of {_comment(of.name)} (FMI {_comment(of.version)}) are which channels "
         "of the ship.",
         "# Drafted by shiplog: look at every line that says CHECK, and take the CHECK away.",
         "", "[simulator]",
-        f"step_s = {step:g}" + ("" if of.step else "  # CHECK communication step"),
+        f"step_s = {step:g}" + ("" if told else "  # CHECK communication step"),
     ]  # fmt: skip
     if of.tool.startswith("shiplog"):  # its coefficients were fitted to inputs that are held
         lines.append('between = "hold"')
@@ -132,7 +135,7 @@ def draft(of: Description, profile: Profile) -> str:
         if output is None and channel not in NEEDED:
             continue
         lines += ["", f"[state.{channel}]", _line("output", output)]
-        if start is not None or channel in RESTARTED:
+        if (start is not None or channel in RESTARTED) and not of.exchange:
             lines.append(_line("start", start))
         lines.append(_unit(output or start, unit))
     for actuator in profile.actuators:
@@ -196,7 +199,7 @@ def _resolved(
         measure, _, _ = STATE[channel]
         factor = _factor(given, measure, f"{path}: state.{channel}")
         start = given.get("start", NONE)
-        if start == NONE and channel in RESTARTED:
+        if start == NONE and channel in RESTARTED and not of.exchange:
             raise _lacks(path, of, f"state.{channel}.start", "what a window begins with")
         states[channel] = {
             "output": named(given.get("output"), f"state.{channel}.output"),
@@ -236,7 +239,7 @@ def _resolved(
     return {
         "step": step, "state": states, "inputs": inputs, "ignored": ignored,
         "parameters": parameters, "actuators": list(profile.actuator_names),
-        "hold": between == "hold",
+        "hold": between == "hold", "exchange": of.exchange,
     }  # fmt: skip
 
 

@@ -84,9 +84,10 @@ def opened(head: dict[str, Any], rows: np.ndarray) -> tuple[Simulator, dict[str,
     """A simulator that is ready, and what is known of it. Raises Refused."""
     path = Path(head["path"])
     if head["kind"] == "fmu":
+        from shiplog.foreign.exchange import ExchangeFmu
         from shiplog.foreign.fmu import Fmu
 
-        found = Fmu(path, head["mapping"])
+        found = (ExchangeFmu if head["mapping"]["exchange"] else Fmu)(path, head["mapping"])
         return found, found.probe(rows)
     function = Called(path, head["function"], head["actuators"], head["wind"])
     function.probe(rows)

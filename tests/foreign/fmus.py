@@ -20,7 +20,7 @@ INPUTS = [("rudder_port", "deg"), ("rudder_starboard", "deg"), ("propeller", "rp
 UNITS = sorted({unit for _, unit in OUTPUTS + INPUTS})
 
 
-def build(to, version=2, outputs=OUTPUTS, inputs=INPUTS, time=False, **wrong):
+def build(to, version=2, outputs=OUTPUTS, inputs=INPUTS, time=False, exchange=False, **wrong):
     """An FMU of the tanker; `wrong` is what is compiled into it, such as REFUSE=30. Skipped where
     there is no compiler."""
     library = compiled(tuple(f"-D{name}={value}" for name, value in wrong.items()))
@@ -28,7 +28,8 @@ def build(to, version=2, outputs=OUTPUTS, inputs=INPUTS, time=False, **wrong):
     place = "linux64" if version == 2 else f"{machine}-linux"
     with zipfile.ZipFile(to, "w") as zipped:
         describe = description2 if version == 2 else description3
-        zipped.writestr("modelDescription.xml", describe(outputs, inputs, time))
+        text = describe(outputs, inputs, time)
+        zipped.writestr("modelDescription.xml", exchanged(text) if exchange else text)
         zipped.write(library, f"binaries/{place}/tanker.so")
     return to
 
@@ -82,6 +83,24 @@ def description2(outputs, inputs, time):
         f'<DefaultExperiment stepSize="0.1"/><ModelVariables>{"".join(rows)}</ModelVariables>'
         f"<ModelStructure><Outputs>{structure}</Outputs></ModelStructure></fmiModelDescription>"
     )
+
+
+def exchanged(text):
+    """The description of FMI 2.0 for model exchange: outputs are states, with derivatives."""
+    count = text.count("<ScalarVariable ")
+    more = "".join(
+        f'<ScalarVariable name="der({name})" valueReference="{40 + i}" causality="local" '
+        f'variability="continuous"><Real derivative="{i + 1}"/></ScalarVariable>'
+        for i, (name, _) in enumerate(OUTPUTS)
+    )
+    of = "".join(f'<Unknown index="{count + 1 + i}"/>' for i in range(len(OUTPUTS)))
+    return (
+        text.replace("<CoSimulation", "<ModelExchange")
+        .replace('canHandleVariableCommunicationStepSize="true"',
+                 'providesDirectionalDerivative="true"')
+        .replace("</ModelVariables>", f"{more}</ModelVariables>")
+        .replace("</ModelStructure>", f"<Derivatives>{of}</Derivatives></ModelStructure>")
+    )  # fmt: skip
 
 
 def description3(outputs, inputs, time):

@@ -184,12 +184,61 @@ EXPORT int fmi2SetReal(Instance s, const unsigned *r, size_t n, const double *v)
     return bad;
 }
 EXPORT int fmi2DoStep(Instance s, double t, double h, int n) { return step(s, h); }
+/* FMI 2.0, model exchange; value references 40-45 are derivatives */
+typedef struct { int more, end, nominals, values, next; double time; } Events;
+EXPORT int fmi2EnterEventMode(Instance s) { return 0; }
+EXPORT int fmi2NewDiscreteStates(Instance s, Events *e) { memset(e, 0, sizeof *e); return 0; }
+EXPORT int fmi2EnterContinuousTimeMode(Instance s) { return 0; }
+EXPORT int fmi2CompletedIntegratorStep(Instance s, int n, int *e, int *t) { return *e = *t = 0; }
+EXPORT int fmi2SetTime(Instance s, double t) { s->time = t; return 0; }
+EXPORT int fmi2SetContinuousStates(Instance s, const double *x, size_t n) {
+    size_t i;
+    for (i = 0; i < n; i++) s->state[i] = x[i] * unit(i);
+    return 0;
+}
+EXPORT int fmi2GetContinuousStates(Instance s, double *x, size_t n) {
+    size_t i;
+    for (i = 0; i < n; i++) x[i] = s->state[i] / unit(i);
+    return 0;
+}
+EXPORT int fmi2GetDerivatives(Instance s, double *x, size_t n) {
+    size_t i;
+#ifdef BLANK
+    if (s->time >= BLANK) return 3;
+#endif
+    rates(s->state, s->input, x);
+    for (i = 0; i < n; i++) x[i] /= unit(i);
+    return 0;
+}
+EXPORT int fmi2GetEventIndicators(Instance s, double *x, size_t n) { return 0; }
+EXPORT int fmi2GetNominalsOfContinuousStates(Instance s, double *x, size_t n) { return 0; }
+EXPORT int fmi2GetDirectionalDerivative(
+    Instance s, const unsigned *unknown, size_t n, const unsigned *known, size_t m,
+    const double *by, double *found) {
+    double up[STATES], down[STATES], h = 1e-6;
+    Ship moved = *s;
+    size_t i, side;
+    for (side = 0; side < 2; side++) {
+        double sign = side ? -1.0 : 1.0;
+        moved = *s;
+        for (i = 0; i < m; i++) {
+            double change = sign * h * by[i];
+            if (known[i] < STATES) moved.state[known[i]] += change * unit(known[i]);
+            else if (known[i] <= 21) moved.input[known[i] - 20] += change * PI / 180.0;
+            else moved.input[known[i] - 20] += known[i] == 22 ? change / 60.0 : change;
+        }
+        rates(moved.state, moved.input, side ? down : up);
+    }
+    for (i = 0; i < n; i++)
+        found[i] = (up[unknown[i] - 40] - down[unknown[i] - 40]) / (2.0 * h) / unit(unknown[i] - 40);
+    return 0;
+}
 #define NONE(name, ...) EXPORT int name(__VA_ARGS__) { return 3; }
 NONE(fmi2GetInteger, void) NONE(fmi2GetBoolean, void) NONE(fmi2GetString, void)
 NONE(fmi2SetInteger, void) NONE(fmi2SetBoolean, void) NONE(fmi2SetString, void)
 NONE(fmi2GetFMUstate, void) NONE(fmi2SetFMUstate, void) NONE(fmi2FreeFMUstate, void)
 NONE(fmi2SerializedFMUstateSize, void) NONE(fmi2SerializeFMUstate, void)
-NONE(fmi2DeSerializeFMUstate, void) NONE(fmi2GetDirectionalDerivative, void)
+NONE(fmi2DeSerializeFMUstate, void)
 NONE(fmi2SetRealInputDerivatives, void) NONE(fmi2GetRealOutputDerivatives, void)
 NONE(fmi2CancelStep, void) NONE(fmi2GetStatus, void) NONE(fmi2GetRealStatus, void)
 NONE(fmi2GetIntegerStatus, void) NONE(fmi2GetBooleanStatus, void) NONE(fmi2GetStringStatus, void)

@@ -9,10 +9,12 @@ pytest.importorskip("fmpy", reason="FMPy is not installed: pip install 'shiplog[
 
 from shiplog.foreign import mapping
 from shiplog.foreign.callables import Refused
+from shiplog.foreign.exchange import ExchangeFmu
 from shiplog.foreign.fmu import Fmu, description
 from shiplog.foreign.mapping import Description
 from shiplog.foreign.rows import apparent
 from shiplog.foreign.source import SimulatorError
+from shiplog.foreign.trying import slopes
 from shiplog.ship_profile import file as profiles
 from shiplog.ship_profile.unchecked_lines import unchecked_lines
 
@@ -33,7 +35,8 @@ def opened(folder, **given):
     draft = folder / "tanker.toml"
     draft.write_text(mapping.draft(told, SHIP), "utf-8")
     assert not unchecked_lines(draft.read_text("utf-8"))
-    return Fmu(path, mapping.load(draft, told, SHIP, False))
+    mapped = mapping.load(draft, told, SHIP, False)
+    return (ExchangeFmu if told.exchange else Fmu)(path, mapped)
 
 
 @pytest.mark.parametrize("version", [2, 3])
@@ -68,6 +71,41 @@ def test_a_window_goes_as_the_equations_do(tmp_path):
         k3 = rate(x + 0.5 * h * k2)
         x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + rate(x + h * k3))
     assert states[0, -1] == pytest.approx(x, abs=1e-6)
+
+
+def test_model_exchange_gives_its_own_derivatives(tmp_path):
+    """ν̇ without a step, and ∂ν̇ by directional derivatives of knots, degrees and rpm."""
+    of = opened(tmp_path, exchange=True)
+    facts = of.probe(rows(12))
+    assert (facts["returns"], facts["differentiated"]) == ("derivative", True)
+    found, troubles = of.rates(rows())
+    wind = apparent(rows())
+    expected = [tanker.f(r[:6], (*r[6:9], *w), 0.0) for r, w in zip(rows(), wind, strict=True)]
+    assert found == pytest.approx(np.array(expected)[:, [1, 3, 5]], rel=1e-9, abs=1e-12)
+    assert not troubles
+    (_, by), _ = slopes(PlainRates(of), rows(), np.full(11, 1e-5))
+    assert of.exact(rows()) == pytest.approx(by, abs=1e-6)
+
+
+def test_a_window_of_model_exchange_is_that_of_co_simulation(tmp_path):
+    row = rows(1)[0]
+    driven = np.tile(row[6:-1], (1, 11, 1))
+    given = (row[None, :6], driven, np.ones((1, 10)), np.zeros(1))
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    one, _ = opened(tmp_path / "a", exchange=True).roll(*given)
+    other, _ = opened(tmp_path / "b").roll(*given)
+    assert one == pytest.approx(other, abs=2e-3)
+
+
+class PlainRates:
+    """Of an FMU, without derivatives of its own."""
+
+    def __init__(self, of):
+        self.rates = of.rates
+
+    def exact(self, rows):
+        return None
 
 
 @pytest.mark.parametrize(
