@@ -214,8 +214,8 @@ def _pushed(model: Extended, theta: np.ndarray) -> bool:
     the water or change readings: one whose numbers are zero adds nothing."""
     at = len(model.base.names)
     for cause in model.causes:
-        kind, numbers = type(cause), theta[..., at : at + cause.count]
-        pushes = kind.coefficients is not Cause.coefficients or kind.force is not Cause.force
+        numbers = theta[..., at : at + cause.count]
+        pushes = cause.changes_ship or type(cause).force is not Cause.force
         if pushes and np.any(numbers):
             return True
         at += cause.count

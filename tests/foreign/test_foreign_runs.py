@@ -15,6 +15,7 @@ from shiplog.commands.train_foreign import Given, foreign_command
 from shiplog.exceptions import RunError, UsageError
 from shiplog.foreign.source import SimulatorError
 from shiplog.logs.conversion.write import Series, write_log
+from shiplog.models.causes import CATALOGUE
 from shiplog.training.runs import foreign_run, load_model
 from shiplog.voyages.ingest.ingest import ingest
 from shiplog.voyages.store.store import Store
@@ -112,6 +113,23 @@ def test_what_was_logged_is_a_run(store, tmp_path):
     with pytest.raises(Exception, match="cannot be sailed"):
         run.simulate(pl.DataFrame({"time": [0.0, 1.0], "rudder": [0.0, 0.0],
                                    "propeller": [5.0, 5.0]}))  # fmt: skip
+
+
+def test_a_poor_stand_in_changes_no_ship(store, tmp_path):
+    """It leaves 60 % of the accelerations: sensors, current and forces are tested all the same."""
+    file = tmp_path / "given.py"
+    file.write_text(CIRCLE)
+    trained(store, tmp_path / "run", Given(str(file)))
+    run = load_model.load(tmp_path / "run", simulators=[str(file)])
+    kept = foreign_run.kept(run)
+    values = kept.values if len(kept.values) else np.ones(3)
+    foreign_run.save(run, kept._replace(values=values, misfit=np.full(3, 0.6)))
+    assert "leaves 60%" in run.fixed and not run.lacks
+    foreign_run.save(run, kept._replace(values=values, misfit=np.full(3, 0.1)))
+    assert not run.fixed
+    assert {c.name for c in CATALOGUE if c.changes_ship} >= {"fouling", "payload", "wind_force"}
+    assert not {c.name for c in CATALOGUE if c.changes_ship} & {"current", "clock_offset", "bank"}
+    foreign_run.close()
 
 
 def test_logs_without_the_topic_are_refused(store, tmp_path):

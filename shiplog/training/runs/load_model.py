@@ -202,6 +202,12 @@ class Run(RunFolder, ABC):
         return ""
 
     @property
+    def fixed(self) -> str:
+        """Why causes that change coefficients of the ship cannot be tested with it; empty where
+        they can."""
+        return ""
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """What a diagnosis has to say of how it is judged, in sentences."""
         return ()
@@ -409,7 +415,7 @@ class ForeignRun(Run):
         return tuple(foreign_run.failures(self.config.foreign))
 
     @property
-    def lacks(self) -> str:
+    def fixed(self) -> str:
         name, known = self.config.foreign.name, foreign_run.kept(self)
         if not len(known.values):
             return f"{self.profile.ship.name} has no MMG that could stand in for {name}"
@@ -442,7 +448,7 @@ class ForeignRun(Run):
                 f"{float(np.median(misfit)):.0%} of them.",
             )
         found = [f"Sensitivities of {of.name}: {of.derivatives}."]
-        if not self.lacks:
+        if not self.fixed:
             found.append(
                 "Causes that change the ship change an MMG that was fitted to its accelerations, "
                 f"and leaves {float(np.median(misfit)):.0%} of them."
