@@ -25,19 +25,17 @@ from shiplog.cli.options import (
 from shiplog.cli.output import LOST, answer
 from shiplog.exceptions import UsageError, listed
 from shiplog.foreign.source import recognised
-from shiplog.models import FORCES, FOREIGN, MODELS, PHYSICS
+from shiplog.models import FORCES, MODELS, PHYSICS, TRAINED
 from shiplog.nomenclature.channels import AUTO_WINDOW, WINDOW
 from shiplog.voyages.windows.augmentation import AUGMENTATIONS
-
-OWN = [name for name, kind in MODELS.items() if kind.family is not FOREIGN]
 
 Out = Annotated[Path, typer.Option(help="The run folder to make.")]
 Model = Annotated[
     str,
     typer.Option(
-        help=f"Which dynamic model: {', '.join(OWN)}, of which begin with mmg; or the file of a "
+        help=f"Which dynamic model: {', '.join(TRAINED)}; begin with mmg. Or the file of a "
         "simulator of your own: FILE.py, FILE.fmu, or 'logs:/TOPIC'.",
-        autocompletion=completion.of_words(MODELS),
+        autocompletion=completion.of_words(TRAINED),
     ),
 ]
 Data = Annotated[

@@ -95,6 +95,10 @@ MODELS = {
 }  # fmt: skip
 
 
+# Those that are trained: a simulator of the user's own is known by its file.
+TRAINED = tuple(name for name, kind in MODELS.items() if kind.family is not FOREIGN)
+
+
 def taking(option: str) -> list[str]:
     """The models that an option of `train` says something to."""
     return [name for name, kind in MODELS.items() if kind.takes(option)]

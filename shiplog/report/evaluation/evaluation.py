@@ -12,6 +12,7 @@ import polars as pl
 
 from shiplog.exceptions import RunNotEvaluated, SeveralRuns, listed
 from shiplog.logs.health.health_report import DerivedChannel
+from shiplog.models import FOREIGN
 from shiplog.nomenclature.contract import CONTRACT
 from shiplog.nomenclature.numbers import counted, figure
 from shiplog.report.evaluation import derived, tables
@@ -216,10 +217,10 @@ class Evaluation(Shows):
                 "band_90": dict(shares.iter_rows()),
                 "winds": tables.winds(errors).drop("run").to_dicts(),
                 "trust": [one.as_json() for one in self.trust.get(run.name, ())],
-                "failures": [asdict(one) for one in run.failures],
                 "residual_tests": [one.as_json() for one in self.residual_tests.get(run.name, ())],
             }
             | self._as_derived
+            | self._failures(run)
         )
 
     @property
@@ -236,6 +237,13 @@ class Evaluation(Shows):
     def _seconds(self) -> float:
         """Of a window, from its first sample to its last."""
         return self.runs[0].config.window - 1.0
+
+    @staticmethod
+    def _failures(run: Run) -> dict:
+        """Of a simulator of the user's own; nothing of all others."""
+        if run.kind.family is not FOREIGN:
+            return {}
+        return {"failures": [asdict(one) for one in run.failures]}
 
     def failed(self, run: Run) -> list[str]:
         """Where a simulator of the user's own failed, in sentences; the first of them."""
