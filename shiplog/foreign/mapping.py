@@ -102,8 +102,10 @@ class Description:
     @classmethod
     def from_record(cls, facts: Mapping[str, Any]) -> Description:
         variables = tuple(Variable(**one) for one in facts["variables"])
-        plain = (facts[key] for key in ("name", "version", "tool", "step"))
-        return cls(*plain, variables, facts["exchange"])
+        return cls(
+            facts["name"], facts["version"], facts["tool"], facts["step"], variables,
+            facts["exchange"],
+        )  # fmt: skip
 
     def named(self, names: Iterable[str], *causalities: str) -> Variable | None:
         """The first variable that goes under one of these names."""

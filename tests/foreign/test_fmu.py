@@ -102,7 +102,7 @@ class PlainRates:
     """Of an FMU, without derivatives of its own."""
 
     def __init__(self, of):
-        self.rates = of.rates
+        self.rates, self.roll = of.rates, of.roll
 
     def exact(self, rows):
         return None
