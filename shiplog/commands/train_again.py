@@ -39,7 +39,7 @@ def _physics(old: RunFolder, out: Path, store_path: Path) -> Answer:
 
 
 def _foreign(old: RunFolder, out: Path, store_path: Path) -> Answer:
-    raise source.not_again(old.name, old.config.foreign.name)
+    source.refuse_again(old.name, old.config.foreign.name)
 
 
 FLOWS = {NETWORK.name: _network, PHYSICS.name: _physics, FOREIGN.name: _foreign}

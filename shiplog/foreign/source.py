@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NoReturn
 
 from shiplog.exceptions import RunError, UsageError
 
@@ -88,8 +89,9 @@ def absent(run: str, name: str, sha256: str) -> SimulatorError:
     )
 
 
-def not_again(run: str, name: str) -> SimulatorError:
-    return SimulatorError(
+def refuse_again(run: str, name: str) -> NoReturn:
+    """Raises SimulatorError."""
+    raise SimulatorError(
         f"{run} is a run of the simulator {name}, which is taken as it is: there is nothing to "
         "train again.",
         hint="give shiplog train --model and the path of the simulator.",
