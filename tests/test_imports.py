@@ -19,6 +19,7 @@ ROWS = {
     "voyages": "10 Hz tables, their store, 1 Hz rows, windows; sensors against each other",
     "drafting": "a profile drafted from a log or a table",
     "models": "dynamic models, and causes as terms of them",
+    "foreign": "simulators of others, each in a child process",
     "simulation": "rollouts, derivatives, errors, baselines",
     "training": "recipes, identification, run folders",
     "diagnosis": "segments, hypotheses, posterior, refutation",

@@ -14,6 +14,7 @@ from shiplog.cli.options import (
     Causes,
     JsonOption,
     ReportOption,
+    Simulators,
     StoreOption,
     TestVoyages,
     page_file,
@@ -48,6 +49,7 @@ def compare(
         typer.Option("--web", help="Show it in a browser, at 127.0.0.1, instead of the viewer."),
     ] = False,
     cause: Causes = None,
+    simulator: Simulators = None,
     report: ReportOption = None,
     json_to: JsonOption = None,
 ) -> None:
@@ -76,7 +78,7 @@ def compare(
         from shiplog.commands.evaluate import keep_pages
     from shiplog.voyages.store.store import Store
 
-    result = compare_runs(runs, Store(store), voyages or [], to, cause or [], at)
+    result = compare_runs(runs, Store(store), voyages or [], to, cause or [], at, simulator or [])
     answer(result, json_to)
     lost = [*result.lost, *keep_pages(result.evaluation, Store(store), page)]
     shown = web or (save is None and page is None)

@@ -9,7 +9,7 @@ import typer
 
 from shiplog.cli import completion
 from shiplog.cli.inputs import check_runs
-from shiplog.cli.options import STORE, Causes, JsonOption, StoreOption, TrialVoyages
+from shiplog.cli.options import STORE, Causes, JsonOption, Simulators, StoreOption, TrialVoyages
 from shiplog.cli.output import LOST, answer
 from shiplog.exceptions import UsageError
 
@@ -38,6 +38,7 @@ def diagnose(
         ),
     ] = None,
     cause: Causes = None,
+    simulator: Simulators = None,
     ships: Annotated[
         Path | None,
         typer.Option(
@@ -94,7 +95,7 @@ def diagnose(
 
     found = diagnose_run(
         run, Store(store), voyages or [], out, extend=extend, cause_files=cause or [],
-        switches=context.obj or ALL, ray=ray,
+        switches=context.obj or ALL, ray=ray, simulators=simulator or [],
     )  # fmt: skip
     answer(found, json_to)
     if not found.drawn:

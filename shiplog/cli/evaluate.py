@@ -14,6 +14,7 @@ from shiplog.cli.options import (
     Causes,
     JsonOption,
     ReportOption,
+    Simulators,
     StoreOption,
     TestVoyages,
     page_file,
@@ -33,6 +34,7 @@ def evaluate(
     voyages: TestVoyages = None,
     store: StoreOption = STORE,
     cause: Causes = None,
+    simulator: Simulators = None,
     report: ReportOption = None,
     json_to: JsonOption = None,
 ) -> None:
@@ -52,8 +54,10 @@ def evaluate(
         from shiplog.commands.evaluate import evaluate_runs, keep_pages, save
     from shiplog.voyages.store.store import Store
 
-    found = evaluate_runs(runs, Store(store), voyages or [], cause or [])
+    found = evaluate_runs(runs, Store(store), voyages or [], cause or [], simulator or [])
     answer(found, json_to)
     leave_lost([*save(found), *keep_pages(found, Store(store), page)])
+    if any(run.failures for run in found.runs):
+        raise typer.Exit(LOST)
     if set(found.too_short) & set(voyages or ()):  # by its own name, and the answer says so
         raise typer.Exit(LOST)

@@ -9,7 +9,7 @@ import typer
 
 from shiplog.cli import completion
 from shiplog.cli.inputs import check_runs
-from shiplog.cli.options import STORE, Causes, JsonOption, StoreOption
+from shiplog.cli.options import STORE, Causes, JsonOption, Simulators, StoreOption
 from shiplog.cli.output import answer
 
 BROKEN = 4  # exit code: a limit is broken
@@ -45,6 +45,7 @@ def gate(
         typer.Option("--write", help="Write a new limits file from today's results, and end."),
     ] = False,
     cause: Causes = None,
+    simulator: Simulators = None,
     json_to: JsonOption = None,
 ) -> None:
     """Whether a run keeps the limits that you set, for CI.
@@ -71,14 +72,14 @@ def gate(
         answer(
             write_limits(
                 run, Store(store), limits, voyages or [], diagnosis=diagnosis,
-                cause_files=cause or [],
+                cause_files=cause or [], simulators=simulator or [],
             ),
             json_to,
         )  # fmt: skip
         return
     done = gate_command(
         run, Store(store), limits, voyages or [], diagnosis=diagnosis, cause_files=cause or [],
-        junit_to=junit,
+        junit_to=junit, simulators=simulator or [],
     )  # fmt: skip
     answer(done, json_to)
     if not done.holds:

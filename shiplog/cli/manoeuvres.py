@@ -14,6 +14,7 @@ from shiplog.cli.options import (
     Causes,
     JsonOption,
     ReportOption,
+    Simulators,
     StoreOption,
     Voyages,
     page_file,
@@ -50,6 +51,7 @@ def manoeuvres(
         int, typer.Option(min=1, help="Draws of a model for its intervals; 1 for none.")
     ] = 100,
     cause: Causes = None,
+    simulator: Simulators = None,
     report: ReportOption = None,
     pilot_card: Annotated[
         Path | None,
@@ -89,7 +91,7 @@ def manoeuvres(
 
     found = manoeuvres_of(
         runs or [], None if alone else Store(store), voyages or [], cause or [], scale=scale,
-        members=members, full_load=full_load,
+        members=members, full_load=full_load, simulators=simulator or [],
     )  # fmt: skip
     answer(found, json_to)
     write_pages(found, *pages)

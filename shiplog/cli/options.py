@@ -103,6 +103,15 @@ Causes = Annotated[
     list[Path] | None,
     typer.Option("--cause", help="A Python file with causes of your own; several times."),
 ]
+Simulators = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--simulator",
+        metavar="PATH",
+        help="The file of a simulator of your own, for a run of it: the run keeps no code. "
+        "Several times.",
+    ),
+]
 Seeds = Annotated[int, typer.Option(min=1, help="Number of seeds; they are numbered from 0.")]
 Window = Annotated[int, typer.Option(min=LEAST_WINDOW, help="Length of a window in seconds.")]
 AutoWindow = Annotated[

@@ -9,7 +9,7 @@ import typer
 
 from shiplog.cli import completion
 from shiplog.cli.inputs import check_voyages
-from shiplog.cli.options import STORE, Causes, JsonOption, StoreOption
+from shiplog.cli.options import STORE, Causes, JsonOption, Simulators, StoreOption
 from shiplog.cli.output import answer
 from shiplog.exceptions import UsageError
 
@@ -79,6 +79,7 @@ def simulate(
         typer.Option(metavar="FILE", help="FILE.parquet, .csv, .mcap or .rrd (a recording)."),
     ] = None,
     cause: Causes = None,
+    simulator: Simulators = None,
     json_to: JsonOption = None,
 ) -> None:
     """A model sailed on a schedule, with its band.
@@ -125,7 +126,7 @@ def simulate(
     if out is not None:
         out = check_file(out, "--out")
         simulation.check(out)
-    opened = load(run, cause or [])
+    opened = load(run, cause or [], simulator or [])
     if voyage is not None:
         from shiplog.voyages.store.store import Store
 

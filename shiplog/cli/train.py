@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -21,18 +22,20 @@ from shiplog.cli.options import (
     Validation,
     Width,
 )
-from shiplog.cli.output import answer
+from shiplog.cli.output import LOST, answer
 from shiplog.exceptions import UsageError, listed
-from shiplog.models import FORCES, MODELS, PHYSICS
-from shiplog.nomenclature.channels import AUTO_WINDOW
+from shiplog.foreign.source import recognised
+from shiplog.models import FORCES, MODELS, PHYSICS, TRAINED
+from shiplog.nomenclature.channels import AUTO_WINDOW, WINDOW
 from shiplog.voyages.windows.augmentation import AUGMENTATIONS
 
 Out = Annotated[Path, typer.Option(help="The run folder to make.")]
 Model = Annotated[
     str,
     typer.Option(
-        help=f"Which dynamic model: {', '.join(MODELS)}; begin with mmg.",
-        autocompletion=completion.of_words(MODELS),
+        help=f"Which dynamic model: {', '.join(TRAINED)}; begin with mmg. Or the file of a "
+        "simulator of your own: FILE.py, FILE.fmu, or 'logs:/TOPIC'.",
+        autocompletion=completion.of_words(TRAINED),
     ),
 ]
 Data = Annotated[
@@ -116,12 +119,32 @@ SheetProfile = Annotated[
     typer.Option("--profile", help="With --trial-sheet: the ship's profile, a name or a path."),
 ]
 
+Mapping = Annotated[
+    Path | None,
+    typer.Option(
+        help="An FMU: TOML that says which of its variables is which channel; drafted where there "
+        "is none.",
+    ),
+]
+SimulatedLogs = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--logs",
+        help="With logs:/TOPIC: the logs that were ingested and hold it, or folders of them.",
+    ),
+]
+
+
 NO_MODEL = (
     "No --model is given: this trains {model}, the paper's network. To begin with a ship, take "
     "--model mmg: it needs fewer voyages, and its coefficients have a meaning."
 )
 OF_SHEET = (  # those that go with --trial-sheet
     "out", "trial_sheet", "profile", "model", "parameters", "without", "free", "json_to",
+)  # fmt: skip
+OF_SIMULATORS = (  # those that go with a simulator's file
+    "out", "model", "voyages", "validation", "window", "mapping", "logs", "store", "json_to",
+    "unchecked",
 )  # fmt: skip
 OF_AGAIN = ("out", "again", "store", "json_to")  # parameters that go with --again
 
@@ -147,6 +170,8 @@ def train(
     folds: Folds = None,
     unchecked: Unchecked = False,
     again: Again = None,
+    mapping: Mapping = None,
+    logs: SimulatedLogs = None,
     trial_sheet: TrialSheet = None,
     profile: SheetProfile = None,
     store: StoreOption = STORE,
@@ -174,6 +199,9 @@ def train(
         parameters=parameters, without=tuple(without or ()), free=tuple(free or ()), folds=folds,
         unchecked=unchecked,
     )  # fmt: skip
+    if recognised(model):
+        _refuse_of_simulators(context)
+        options = replace(options, model=next(iter(MODELS)))
     options.check()
     refuse_run(out)
     check_writable(out, "--out")
@@ -200,6 +228,18 @@ def train(
             hint="leave it out.",
         )
     check_voyages(store, voyages, validation)
+    if recognised(model):
+        from shiplog.commands.bars import loading
+
+        with loading():
+            from shiplog.commands.train_foreign import Given, foreign_command
+        size = WINDOW if options.window == AUTO_WINDOW else options.window
+        given = Given(model, mapping, tuple(logs or ()), unchecked)
+        found = foreign_command(given, store, out, options.voyages, options.validation, int(size))
+        answer(found, json_to)
+        if not found.complete:
+            raise typer.Exit(LOST)
+        return
     if not _typed(context, "model"):
         typer.echo(NO_MODEL.format(model=model), err=True)
     from shiplog.commands.bars import loading
@@ -208,6 +248,21 @@ def train(
         from shiplog.commands.train import train_command
     found = train_command(store, out, options)
     answer(found, json_to)
+
+
+def _refuse_of_simulators(context: typer.Context) -> None:
+    """Raises UsageError for an option that trains: a simulator is taken as it is."""
+    given = [
+        "no-fit" if (name, value) == ("fit", False) else name.replace("_", "-")
+        for name, value in context.params.items()
+        if name not in OF_SIMULATORS and _typed(context, name)
+    ]
+    if given:
+        raise UsageError(
+            f"A simulator of your own is taken as it is: {listed(f'--{name}' for name in given)} "
+            "says nothing to it.",
+            hint="leave it out.",
+        )
 
 
 def _refuse_others(context: typer.Context) -> None:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from shiplog.exceptions import ShiplogError
+from shiplog.nomenclature.channels import WINDOW
 from shiplog.voyages.store.store import Store
 from shiplog.voyages.store.voyage import Voyage
 
@@ -155,12 +156,15 @@ def train(
     without: Words = (),
     free: Words = (),
     folds: int | None = None,
+    mapping: str | Path | None = None,
+    logs: Files = (),
 ) -> Run:
     """A model of the voyages, as the run folder `out`.
 
         shiplog.train(store, "runs/mmg", model="mmg", voyages=["june_*"])
 
-    model        which dynamic model: feedforward, mmg or hybrid; begin with mmg
+    model        which dynamic model: feedforward, mmg or hybrid; begin with mmg. Or the file of a
+                 simulator of your own: FILE.py, FILE.fmu, or logs:/TOPIC
     data         the paper's window set: ref, sli2, ..., d-ref
     voyages      names or shell patterns of the voyages to learn from; all where there are none
     validation   those to validate on
@@ -182,13 +186,22 @@ def train(
     free         patterns of the coefficients to identify, such as wind.*; all where there are none
     folds        parts in which voyages are held out in turn, 5 unless given; below 2 none is
 
+    Of a simulator of your own:
+    mapping      of an FMU: TOML that says which of its variables is which channel
+    logs         that hold its states, of logs:/TOPIC
+
     Raises ShiplogError for voyages that cannot be trained on, for options that exclude each other
     and for a folder that is taken.
     """
     from shiplog.commands.train import train_command
+    from shiplog.foreign.source import recognised
     from shiplog.training.runs import load_model
     from shiplog.training.settings.options import TrainOptions
 
+    if recognised(model):
+        return _simulator(
+            store, Path(out), model, voyages, validation, window, unchecked, mapping, logs
+        )
     options = TrainOptions(
         model=model, data=data, voyages=tuple(_names(voyages)),
         validation=tuple(_names(validation)), seeds=seeds, window=window, unchecked=unchecked,
@@ -201,20 +214,38 @@ def train(
     return load_model.load(into)
 
 
-def load(path: str | Path, causes: Files = ()) -> Run:
+def _simulator(
+    store: AnyStore, out: Path, model: str, voyages: Names, validation: Names,
+    window: int | str, unchecked: bool, mapping: str | Path | None, logs: Files,
+) -> Run:  # fmt: skip
+    """The run of a simulator of the user's own."""
+    from shiplog.commands.train_foreign import Given, foreign_command
+    from shiplog.training.runs import load_model
+
+    to = None if mapping is None else Path(mapping)
+    given = Given(model, to, tuple(_files(logs)), unchecked)
+    size = window if isinstance(window, int) else WINDOW
+    chosen = tuple(_names(voyages)), tuple(_names(validation))
+    foreign_command(given, _path(store), out, *chosen, size)
+    return load_model.load(out, simulators=[model])
+
+
+def load(path: str | Path, causes: Files = (), *, simulators: Files = ()) -> Run:
     """A finished run. `causes`: Python files of its causes that are not in the catalogue, which
-    are executed. Raises RunError."""
+    are executed. `simulators`: files of simulators of your own, for a run of one: it is run in a
+    child process. Raises RunError."""
     from shiplog.models.causes import user
     from shiplog.training.runs import load_model
 
-    return load_model.load(Path(path), user.load(_files(causes)))
+    return load_model.load(Path(path), user.load(_files(causes)), _given(simulators))
 
 
 def evaluate(
-    runs: AnyRuns, store: AnyStore, voyages: Names = (), *, causes: Files = ()
-) -> Evaluation:
+    runs: AnyRuns, store: AnyStore, voyages: Names = (), *, causes: Files = (),
+    simulators: Files = (),
+) -> Evaluation:  # fmt: skip
     """Simulated against measured, window by window, with baselines. Without `voyages`, those that
-    the run kept for its test. `causes`: as for `load`. Raises ShiplogError.
+    the run kept for its test. `causes` and `simulators`: as for `load`. Raises ShiplogError.
 
     Of one run `evaluation.loss` is its mean L, `evaluation.rmse` its errors, and so on; of several
     `evaluation["mmg"].loss`. `evaluation.baselines` is what they compare with.
@@ -222,7 +253,7 @@ def evaluate(
     from shiplog.commands import evaluate as evaluating
 
     return evaluating.evaluate_runs(
-        _runs(runs), Store(_path(store)), _names(voyages), _files(causes)
+        _runs(runs), Store(_path(store)), _names(voyages), _files(causes), _given(simulators)
     )
 
 
@@ -234,6 +265,7 @@ def compare(
     save: str | Path | None = None,
     causes: Files = (),
     at: str | None = None,
+    simulators: Files = (),
 ) -> Comparison:
     """The same as a Rerun recording: `save`, or compare.rrd in the first run. `save` may also be
     a .png, .svg or .html. `at`: "VOYAGE:SECONDS" that it is opened at. Raises ShiplogError."""
@@ -241,7 +273,13 @@ def compare(
 
     to = None if save is None else Path(save)
     done = comparing.compare_runs(
-        _runs(runs), Store(_path(store)), _names(voyages), to, _files(causes), at
+        _runs(runs),
+        Store(_path(store)),
+        _names(voyages),
+        to,
+        _files(causes),
+        at,
+        _given(simulators),
     )
     done.written()
     return done
@@ -256,6 +294,7 @@ def diagnose(
     extend: str | Path | None = None,
     causes: Files = (),
     ray: str | None = None,
+    simulators: Files = (),
 ) -> Diagnosis:
     """What the model gets wrong on these voyages, why, and what the causes gain on held-out ones.
 
@@ -263,6 +302,7 @@ def diagnose(
     extend   write the model with the named causes as this run
     causes   Python files with causes of your own, which are executed
     ray      address of a Ray cluster that holds the segments, for very many voyages
+    simulators   as for `load`
 
     Raises ShiplogError.
     """
@@ -272,7 +312,7 @@ def diagnose(
     (path,) = _runs(run)
     return diagnosing.diagnose_run(
         path, Store(_path(store)), _names(voyages), Path(out), extend=to,
-        cause_files=_files(causes), ray=ray,
+        cause_files=_files(causes), ray=ray, simulators=_given(simulators),
     )  # fmt: skip
 
 
@@ -306,13 +346,14 @@ def gate(
     *,
     diagnosis: str | Path | None = None,
     causes: Files = (),
+    simulators: Files = (),
 ) -> Gate:
     """Limits of yours against today's results: `holds`, and an outcome for each limit.
 
     limits     TOML, as docs/use/gate.md has it
     diagnosis  folder of a diagnosis of these voyages, for limits on verdict and causes; made there
                where there is none
-    causes     as for `load`
+    causes, simulators   as for `load`
 
     Raises ShiplogError.
     """
@@ -322,7 +363,7 @@ def gate(
     where = None if diagnosis is None else Path(diagnosis)
     return gating.gate_run(
         path, Store(_path(store)), Path(limits), _names(voyages), diagnosis=where,
-        cause_files=_files(causes),
+        cause_files=_files(causes), simulators=_given(simulators),
     )  # fmt: skip
 
 
@@ -339,6 +380,7 @@ def simulate(
     seed: int = 0,
     out: str | Path | None = None,
     causes: Files = (),
+    simulators: Files = (),
 ) -> Simulation:
     """A run's model on a manoeuvre of `shiplog.simulation.schedules`, on the orders of a CSV file,
     or, with `store`, on the inputs of the voyage of that name.
@@ -357,7 +399,7 @@ def simulate(
     from shiplog.simulation.sailing import Water, from_direction
 
     (path,) = _runs(run)
-    opened = simulating.load(path, _files(causes))
+    opened = simulating.load(path, _files(causes), _given(simulators))
     to = None if out is None else Path(out)
     if store is not None:
         return simulating.simulate_voyage(
@@ -447,6 +489,7 @@ def find_manoeuvres(
     members: int = 100,
     full_load: bool = False,
     causes: Files = (),
+    simulators: Files = (),
 ) -> ManoeuvreSheet:
     """Turns, zigzags, stops, pull-outs and spirals of these voyages, all of the store where none
     is named: measured, and sailed by a run and an extended one. Without `store`, what the runs
@@ -457,7 +500,7 @@ def find_manoeuvres(
     where = None if store is None else Store(_path(store))
     return finding.manoeuvres_of(
         _runs(runs), where, _names(voyages), _files(causes), scale=scale, members=members,
-        full_load=full_load,
+        full_load=full_load, simulators=_given(simulators),
     )  # fmt: skip
 
 
@@ -472,6 +515,13 @@ def _names(voyages: Names) -> list[str]:
 
 def _files(files: Paths) -> list[Path]:
     return [Path(one) for one in ([files] if isinstance(files, str | Path) else files)]
+
+
+def _given(simulators: Paths) -> list[str]:
+    """Files of simulators, or FILE.py:NAME."""
+    return [
+        str(one) for one in ([simulators] if isinstance(simulators, str | Path) else simulators)
+    ]
 
 
 def _profile(profile: str | Path | None) -> str | None:

@@ -122,6 +122,7 @@ def compare_runs(
     save_to: Path | None,
     cause_files: Sequence[Path] = (),
     at: str | None = None,
+    simulators: Sequence[str] = (),
 ) -> Comparison:
     """Evaluate the runs on the same windows and record both sides; in the first run's folder
     unless a path is given, whose ending says what is written.
@@ -134,7 +135,7 @@ def compare_runs(
     if moment is not None:
         moments.check(store, *moment)
         voyages = moments.among(store, moment[0], voyages)
-    found = evaluate_runs(paths, store, voyages, cause_files)
+    found = evaluate_runs(paths, store, voyages, cause_files, simulators)
     opened = None
     if moment is not None:
         opened = Moment(*moment, WINDOWS_SHOWN * found.runs[0].config.window)

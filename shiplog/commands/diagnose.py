@@ -46,7 +46,6 @@ from shiplog.report.page.diagnosis import source as sources
 from shiplog.report.page.diagnosis.source import PROVENANCE, VERDICT
 from shiplog.report.result import Shown
 from shiplog.ship_profile.profile import Profile
-from shiplog.simulation.extended_simulator import ExtendedSimulator
 from shiplog.training.runs import extension_file, load_model
 from shiplog.training.runs.load_model import Run
 from shiplog.training.runs.provenance import portable, provenance
@@ -81,18 +80,22 @@ def diagnose_run(
     cause_files: Sequence[Path] = (),
     switches: Parts = ALL,
     ray: str | None = None,
+    simulators: Sequence[str] = (),
 ) -> Diagnosis:
     """The whole way; the `switches` say which parts of the decision act. Raises ShiplogError.
 
-    ray   address of a Ray cluster that holds the segments and adds up their products; the numbers
-          are the same
+    ray         address of a Ray cluster that holds the segments and adds up their products; the
+                numbers are the same
+    simulators  files of simulators of the user's own: the run may be one of these
     """
     if ray is None:
-        return _run(run_path, store, voyages, out, extend, cause_files, switches)
+        return _run(
+            run_path, store, voyages, out, extend, cause_files, switches, simulators=simulators
+        )
     from shiplog.commands import cluster_trials  # what a diagnosis in one process does without
 
     with cluster_trials.on_cluster(ray) as share:
-        return _run(run_path, store, voyages, out, extend, cause_files, switches, share)
+        return _run(run_path, store, voyages, out, extend, cause_files, switches, share, simulators)
 
 
 def _run(
@@ -104,11 +107,12 @@ def _run(
     cause_files: Sequence[Path],
     switches: Parts,
     share: Callable[[Trial], Trial] = lambda trial: trial,
+    simulators: Sequence[str] = (),
 ) -> Diagnosis:
     began = time.time()
     check_diagnosis(out, extend)
     causes = user.load(cause_files)
-    run = load_model.load(run_path, causes)
+    run = load_model.load(run_path, causes, simulators)
     names = trial_voyages.voyages_of(run, store, voyages)
     profile = store.profile(names)
     refuse_other_ship(run, profile)
@@ -144,7 +148,8 @@ def _run(
         log.info("no named cause can be part of a model: %s is not written", extend)
         return done
     # last: once it is there, the same command is refused
-    return replace(done, extended=_extended(run, done.after, extend, cause_files, causes))
+    path = extension_file.extend(run, extend, done.after, cause_files)
+    return replace(done, extended=load_model.load(path, causes, simulators))
 
 
 @dataclass(frozen=True)
@@ -186,6 +191,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> Diagnosis:
         notes.append(answer.without_nominal(run, store.path))
     if run.given:
         notes.append(answer.of_given(run))
+    notes += run.notes
     cut = trial_voyages.windows_of(run, store, names, profile)
     before = _nominal_windows(of) if nominal is not None else None
     if cut is not None and before is not None:
@@ -294,13 +300,6 @@ def _save(
     portable_places = {key: portable([str(path)])[0] for key, path in places.items()}
     facts = provenance(hashes, began) | portable_places
     files.write_json(done.folder / PROVENANCE, facts)
-
-
-def _extended(
-    run: Run, after: ExtendedSimulator, out: Path, own: Sequence[Path], causes: Sequence[Cause]
-) -> Run:
-    """The model with the named causes, as the run `out`."""
-    return load_model.load(extension_file.extend(run, out, after, own), causes)
 
 
 def _drawn(done: Diagnosis, run: Run, seconds: voyage_tables.Seconds) -> Diagnosis:

@@ -58,14 +58,16 @@ def evaluate_runs(
     store: Store,
     voyages: Sequence[str],
     cause_files: Sequence[Path] = (),
+    simulators: Sequence[str] = (),
 ) -> Evaluation:
     """Roll every run's models out over the chosen voyages. Raises ShiplogError.
 
     cause_files   Python files of the causes of the user's own that are in these runs
+    simulators    files of simulators of the user's own, of which some are
     """
     refuse_same_names(paths)
     causes = user.load(cause_files)
-    opened = tuple(load_model.load(path, causes) for path in paths)
+    opened = tuple(load_model.load(path, causes, simulators) for path in paths)
     first = opened[0]
     for other in opened[1:]:
         refuse_other_window(first, other)

@@ -44,6 +44,7 @@ class Judged:
     cause_files: tuple[Path, ...]
     kept: Diagnosed | None
     folder: Path | None
+    simulators: tuple[str, ...] = ()
 
     @property
     def windless(self) -> bool:
@@ -52,7 +53,9 @@ class Judged:
 
     def evaluated(self) -> Evaluation:
         """Raises WindowError where no voyage is long enough for a window."""
-        return evaluate_runs([self.run.path], self.store, self.names, self.cause_files)
+        return evaluate_runs(
+            [self.run.path], self.store, self.names, self.cause_files, self.simulators
+        )
 
     def diagnosed(self) -> Diagnosed:
         """The verdict of the folder, else one of today, which is kept where there is a folder."""
@@ -72,7 +75,12 @@ class Judged:
 
     def _made(self, folder: Path) -> Diagnosed:
         done = diagnose_run(
-            self.run.path, self.store, self.names, folder, cause_files=self.cause_files
+            self.run.path,
+            self.store,
+            self.names,
+            folder,
+            cause_files=self.cause_files,
+            simulators=self.simulators,
         )
         return diagnosed.of(files.finite(done.verdict.as_json()))
 
@@ -85,15 +93,17 @@ def gate_run(
     *,
     diagnosis: Path | None = None,
     cause_files: Sequence[Path] = (),
+    simulators: Sequence[str] = (),
 ) -> Gate:
     """Hold a run against limits.toml. Raises ShiplogError where it cannot be judged.
 
     voyages      unless given: those of the diagnosis, else those that `evaluate` takes
     diagnosis    a folder of `diagnose`; where there is none yet, the diagnosis is made there
     cause_files  Python files of the causes of the user's own, which are executed
+    simulators   files of simulators of the user's own: the run may be one of these
     """
     limits = limits_file.load(limits_path)
-    of = _judged(run_path, store, voyages, diagnosis, cause_files)
+    of = _judged(run_path, store, voyages, diagnosis, cause_files, simulators)
     _check(limits, str(limits_path), of)
     found, lacking = None, ""
     if limits.of_windows:
@@ -131,12 +141,19 @@ def gate_command(
     diagnosis: Path | None = None,
     cause_files: Sequence[Path] = (),
     junit_to: Path | None = None,
+    simulators: Sequence[str] = (),
 ) -> Gate:
     """As `gate_run`, with the result as JUnit XML; that of a run that cannot be judged is an error.
     Raises ShiplogError."""
     try:
         done = gate_run(
-            run_path, store, limits_path, voyages, diagnosis=diagnosis, cause_files=cause_files
+            run_path,
+            store,
+            limits_path,
+            voyages,
+            diagnosis=diagnosis,
+            cause_files=cause_files,
+            simulators=simulators,
         )
     except ShiplogError as error:
         if junit_to is not None:
@@ -155,12 +172,13 @@ def write_limits(
     *,
     diagnosis: Path | None = None,
     cause_files: Sequence[Path] = (),
+    simulators: Sequence[str] = (),
 ) -> Answer:
     """A new limits.toml from today's results: a golden run. Limits on a verdict are in it where
     `diagnosis` is given. Raises ShiplogError, also where the file is there already."""
     check_file(limits_path, "--limits")
     refuse_taken(limits_path, "--limits")
-    of = _judged(run_path, store, voyages, diagnosis, cause_files)
+    of = _judged(run_path, store, voyages, diagnosis, cause_files, simulators)
     found = of.evaluated()
     verdict = of.diagnosed() if diagnosis is not None else None
     count = golden.write(limits_path, golden.text(found, verdict, of.own, of.windless))
@@ -179,9 +197,10 @@ def _judged(
     voyages: Sequence[str],
     diagnosis: Path | None,
     cause_files: Sequence[Path],
+    simulators: Sequence[str],
 ) -> Judged:
     own = user.load(cause_files)
-    run = load_model.load(run_path, own)
+    run = load_model.load(run_path, own, simulators)
     if diagnosis is None or not diagnosis.exists():
         names = store.select(list(voyages)) if voyages else held_back([run], store)
         kept = None
@@ -192,7 +211,9 @@ def _judged(
         names = store.select(list(voyages) if voyages else folder.voyages)
         diagnosis_folder.check(folder, run, names, store.hashes(names))
         kept = folder.verdict
-    return Judged(run, store, tuple(names), own, tuple(cause_files), kept, diagnosis)
+    return Judged(
+        run, store, tuple(names), own, tuple(cause_files), kept, diagnosis, tuple(simulators)
+    )
 
 
 def _check(limits: Limits, source: str, of: Judged) -> None:

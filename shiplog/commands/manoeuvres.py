@@ -34,12 +34,13 @@ def manoeuvres_of(
     scale: float = 1.0,
     members: int = MEMBERS,
     full_load: bool = False,
+    simulators: Sequence[str] = (),
 ) -> ManoeuvreSheet:
     """Of these voyages, all of the store where none is named; of the runs alone without a store.
     Raises ShiplogError."""
     refuse_same_names(paths)
     causes = user.load(cause_files)
-    runs = [load_model.load(path, causes) for path in paths]
+    runs = [load_model.load(path, causes, simulators) for path in paths]
     names: list[str] = [] if store is None else store.select(list(voyages) or None)
     profile = store.profile(names) if store is not None else _profile_of(runs)
     for run in runs:

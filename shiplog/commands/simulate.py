@@ -65,5 +65,5 @@ def _written(found: Simulation, out: Path | None) -> Simulation:
     return replace(found, saved=out)
 
 
-def load(path: Path, cause_files: Sequence[Path]) -> Run:
-    return load_model.load(path, user.load(cause_files))
+def load(path: Path, cause_files: Sequence[Path], simulators: Sequence[str] = ()) -> Run:
+    return load_model.load(path, user.load(cause_files), simulators)

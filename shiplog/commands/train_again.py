@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from shiplog.commands.bars import loading
+from shiplog.foreign import source
 from shiplog.machine.paths import refuse_run
-from shiplog.models import NETWORK, PHYSICS
+from shiplog.models import FOREIGN, NETWORK, PHYSICS
 from shiplog.report.result import Answer
 from shiplog.training.runs import run_folder
 from shiplog.training.runs.run_checks import refuse_extended, refuse_sheet
@@ -37,4 +38,8 @@ def _physics(old: RunFolder, out: Path, store_path: Path) -> Answer:
     return found.answer(store_path)
 
 
-FLOWS = {NETWORK.name: _network, PHYSICS.name: _physics}
+def _foreign(old: RunFolder, out: Path, store_path: Path) -> Answer:
+    source.refuse_again(old.name, old.config.foreign.name)
+
+
+FLOWS = {NETWORK.name: _network, PHYSICS.name: _physics, FOREIGN.name: _foreign}

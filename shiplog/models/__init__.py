@@ -15,7 +15,8 @@ class ModelFamily:
     """How models of a kind are trained.
 
     name       "network": weights, by the gradient of the loss of rollouts; "physics":
-               coefficients with a meaning, by output error
+               coefficients with a meaning, by output error; "foreign": not at all, its equations
+               are somebody else's
     noun       what a sentence calls a model of it
     options    of `train` that the family takes, in addition to those of all; "copies" are noisy
                ones of the windows
@@ -43,7 +44,13 @@ PHYSICS = ModelFamily(
     options=("fit", "parameters", "without", "free", "folds"),
     sections=("physics",),
 )
-FAMILIES = (NETWORK, PHYSICS)
+FOREIGN = ModelFamily(
+    "foreign",
+    "a simulator of your own",
+    options=(),
+    sections=("foreign",),
+)
+FAMILIES = (NETWORK, PHYSICS, FOREIGN)
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +91,12 @@ MODELS = {
         "the mmg and a small residual network that fades outside its training data",
         PHYSICS, "shiplog.models.hybrid", residual=True,
     ),
+    "foreign": Kind("a simulator of your own, by its file: FILE.py, FILE.fmu", FOREIGN),
 }  # fmt: skip
+
+
+# Those that are trained: a simulator of the user's own is known by its file.
+TRAINED = tuple(name for name, kind in MODELS.items() if kind.family is not FOREIGN)
 
 
 def taking(option: str) -> list[str]:

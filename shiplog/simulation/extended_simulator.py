@@ -66,7 +66,7 @@ class ExtendedSimulator:
             np.ones(shape[0]),
         )
         with np.errstate(all="ignore"):
-            states = rollout(self.model, theta, data)
+            states = rollout(self.model, theta, data, windows.plan["elapsed"].to_numpy())
             if not any(cause.reads for cause in self.model.causes):
                 return states
             as_recorded = replace(was, state=states.reshape(-1, 6))

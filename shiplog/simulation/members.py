@@ -9,14 +9,13 @@ among what drives it, so that one call serves all members.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 
-from shiplog.machine import trees
-from shiplog.machine.arrays import Array
 from shiplog.nomenclature.channels import VELOCITY_IN_STATE
+from shiplog.simulation import foreign_model
+from shiplog.simulation.each_its_own import EachItsOwn
 from shiplog.simulation.kernel import rollouts
 from shiplog.simulation.window_series import apparent_wind
 
@@ -27,38 +26,14 @@ ROWS_AT_A_TIME = 2048
 Rates = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 
-@trees.tree(data=["base"], fixed=["count"])
-@dataclass(frozen=True)
-class EachItsOwn:
-    """A model whose `count` coefficients stand behind its actuators; θ is empty."""
-
-    base: Any
-    count: int
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return ()
-
-    @property
-    def substeps(self) -> int:
-        return self.base.substeps
-
-    @property
-    def smooth(self) -> float:
-        return self.base.smooth
-
-    def acceleration(self, theta: Array, state: Array, actuator: Array, true_wind: Array) -> Array:
-        """ν̇ [3] of one sample; arguments as for MMG.acceleration."""
-        at = actuator.shape[-1] - self.count
-        return self.base.acceleration(actuator[at:], state, actuator[:at], true_wind)
-
-
 def of_physics(model: Any, theta: np.ndarray, more: int = 0) -> Rates:
     """Of equations with their coefficients θ [P], or [N, P] one row a member.
 
     more   columns of ones behind the actuators: the share of the campaign of an extended model,
            at its end
     """
+    if foreign_model.simulator_of(model) is not None:
+        return _of_foreign(model, theta, more)
     own = theta.ndim == 2
     whole = EachItsOwn(model, theta.shape[-1]) if own else model
     fixed = np.zeros(0) if own else theta
@@ -79,6 +54,16 @@ def of_physics(model: Any, theta: np.ndarray, more: int = 0) -> Rates:
             return of(inputs)
         parts = range(0, count, ROWS_AT_A_TIME)
         return np.concatenate([of(inputs[at : at + ROWS_AT_A_TIME]) for at in parts])
+
+    return rates
+
+
+def _of_foreign(model: Any, theta: np.ndarray, more: int) -> Rates:
+    """Of a simulator of others, with causes in it or not."""
+
+    def rates(state: np.ndarray, actuator: np.ndarray, wind: np.ndarray) -> np.ndarray:
+        inputs = np.concatenate((state, actuator, np.ones((len(state), more)), wind), 1)
+        return foreign_model.values(model, theta, inputs)
 
     return rates
 

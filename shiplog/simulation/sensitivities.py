@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shiplog.simulation import foreign_model
 from shiplog.simulation.kernel import rollouts
 from shiplog.simulation.scoring import window_loss
 from shiplog.simulation.window_series import Normal, Physical, WindowSeries, pick, series
@@ -18,11 +19,16 @@ from shiplog.voyages.windows.windows import Windows
 WINDOWS_AT_A_TIME = 128  # their sensitivities to 60 parameters are 45 MB
 
 
-def rollout(model: Physical, theta: np.ndarray, data: WindowSeries) -> np.ndarray:
+def rollout(
+    model: Physical, theta: np.ndarray, data: WindowSeries, begin: np.ndarray | None = None
+) -> np.ndarray:
     """Explicit Euler (Eq. 9) from the first measured state: states [N, I, 6].
 
-    The paper's step is the sampling interval; a model with `substeps` cuts it, inputs held.
+    The paper's step is the sampling interval; a model with `substeps` cuts it, inputs held. A
+    simulator of others goes on as it does by itself, `begin` [N] s into the voyages.
     """
+    if foreign_model.simulator_of(model) is not None:
+        return foreign_model.rollout(model, theta, data, begin)
     found = rollouts.rollout(model, theta, data)
     if found is None:
         from shiplog.simulation import jax_rollouts

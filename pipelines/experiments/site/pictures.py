@@ -119,7 +119,7 @@ HOUSE = (  # package, what it holds; from below, which is what is imported by al
      ("ship_profile", "the profile")),
     (("logs", "MCAP, other formats"), ("voyages", "10 Hz table, 1 Hz rows"),
      ("drafting", "of profiles")),
-    (("models", "mmg, networks, causes"), ("simulation", "rollouts, L, coverage"),
+    (("models", "mmg, networks, causes"), ("foreign", "FMU, callable, logged"), ("simulation", "rollouts, L, coverage"),
      ("training", "recipes, runs")),
     (("diagnosis", "segments to verdict"), ("manoeuvres", "found, measured, sailed"),
      ("planning", "what to sail next"), ("report", "page, figures, viewer")),

@@ -20,9 +20,11 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from shiplog.diagnosis.linear import foreign_paths
 from shiplog.diagnosis.linear.linear_segments import Linear, Path, Wide
 from shiplog.diagnosis.linear.measurement_correction import Moved
 from shiplog.diagnosis.linear.segments import Cut, SegmentGrid
+from shiplog.simulation import foreign_model
 from shiplog.simulation.kernel import paths, rollouts
 from shiplog.simulation.window_series import Physical
 
@@ -87,6 +89,9 @@ def accelerations(
     """f(x, u; θ) [S, n, 3], the model's (u̇, v̇, ṙ) in m/s² and rad/s², at states x [S, n, 6] and
     what drives u [S, n, A + 3]."""
     inputs = np.concatenate((states, driven), 2).reshape(-1, states.shape[2] + driven.shape[2])
+    if foreign_model.simulator_of(model) is not None:
+        found = foreign_model.values(model, theta, inputs)
+        return found.reshape(*states.shape[:2], 3)
     found = rollouts.values(model, theta, inputs)
     if found is not None:
         return found.reshape(*states.shape[:2], 3)
@@ -262,6 +267,9 @@ def simulated(
         path.start, _interpolate(path.interpolate(g), many), _interpolate(segments.driven, many),
         _interpolate(g.weights[None], many)[0], segments.step / many, g.bins, _series(moved, many),
     )  # fmt: skip
+    if foreign_model.simulator_of(model) is not None:
+        with np.errstate(all="ignore"):
+            return foreign_paths.columns(model, theta, *along)
     found = paths.columns(model, theta, *along)
     if found is not None:
         return found

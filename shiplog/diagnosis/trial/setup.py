@@ -52,6 +52,9 @@ def trial_of(
     if lacking:
         untested |= {c.label: lacking for c in chosen if c.kind != "sensor"}
         chosen = [c for c in chosen if c.kind == "sensor"]
+    if run.fixed:
+        untested |= {c.label: run.fixed for c in chosen if c.changes_ship}
+        chosen = [c for c in chosen if not c.changes_ship]
     for cause in [c for c in chosen if c.name in (barred or {})]:
         untested[cause.label] = (barred or {})[cause.name]
         chosen.remove(cause)

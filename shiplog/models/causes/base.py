@@ -229,6 +229,11 @@ class Cause:
         return math.inf
 
     @property
+    def changes_ship(self) -> bool:
+        """Whether it changes coefficients of the ship."""
+        return type(self).coefficients is not Cause.coefficients
+
+    @property
     def reads(self) -> bool:
         """Whether it changes what was recorded, and not the ship's motion."""
         return type(self).read is not Cause.read

@@ -12,6 +12,7 @@ import polars as pl
 
 from shiplog.exceptions import RunNotEvaluated, SeveralRuns, listed
 from shiplog.logs.health.health_report import DerivedChannel
+from shiplog.models import FOREIGN
 from shiplog.nomenclature.contract import CONTRACT
 from shiplog.nomenclature.numbers import counted, figure
 from shiplog.report.evaluation import derived, tables
@@ -19,12 +20,15 @@ from shiplog.report.evaluation import trust as trusted
 from shiplog.report.evaluation.judgement import MEANING, Judgement, force_line, judge
 from shiplog.report.result import Shown, Shows
 from shiplog.simulation.better_model import Better
+from shiplog.simulation.foreign_model import sentences
 from shiplog.simulation.residual_tests import ResidualTest
 from shiplog.training.physics.trust import CoefficientTrust
 from shiplog.training.runs.load_model import Run
 from shiplog.voyages.store import contradicted
 from shiplog.voyages.store.contradicted import Contradicted
 from shiplog.voyages.windows.ship_time import ShipTime
+
+MOST_FAILURES = 5  # of a simulator, that are listed
 
 
 @dataclass(frozen=True)
@@ -216,6 +220,7 @@ class Evaluation(Shows):
                 "residual_tests": [one.as_json() for one in self.residual_tests.get(run.name, ())],
             }
             | self._as_derived
+            | self._failures(run)
         )
 
     @property
@@ -232,6 +237,17 @@ class Evaluation(Shows):
     def _seconds(self) -> float:
         """Of a window, from its first sample to its last."""
         return self.runs[0].config.window - 1.0
+
+    @staticmethod
+    def _failures(run: Run) -> dict:
+        """Of a simulator of the user's own; nothing of all others."""
+        if run.kind.family is not FOREIGN:
+            return {}
+        return {"failures": [asdict(one) for one in run.failures]}
+
+    def failed(self, run: Run) -> list[str]:
+        """Where a simulator of the user's own failed, in sentences; the first of them."""
+        return sentences(run.config.foreign.name, run.failures)[:MOST_FAILURES]
 
     @property
     def window_advice(self) -> str:
@@ -276,6 +292,7 @@ class Evaluation(Shows):
         lines = [
             *([self.warning] if self.warning else []),
             *[self.judgement(run).sentence for run in self.runs],
+            *[one for run in self.runs for one in self.failed(run)],
             *trusted.better_lines(self.better),
             *([self.window_advice] if self.window_advice else []),
             *([said] if (said := derived.loss_sentence(self.derived, self._seconds)) else []),

@@ -10,7 +10,7 @@ import numpy as np
 from shiplog.nomenclature.channels import VELOCITY_WEIGHTS
 from shiplog.simulation.kernel import kinds
 from shiplog.simulation.kernel.kinds import Kernel, Purpose, aligned, contiguous, pointer, unset
-from shiplog.simulation.kernel.windows import BLOCK, STATES, Windows
+from shiplog.simulation.kernel.windows import BLOCK, STATES, Sizes, Windows
 from shiplog.simulation.window_series import Normal, WindowSeries
 
 CHUNK = 8  # steps whose rows are kept before they are summed: 24 rows of 70 are in the cache
@@ -35,6 +35,15 @@ SLOPES = Purpose(
     "slopes", _write_slopes, (("derivatives", "state and θ"),),
     (("slopes_of", "ppppppppiiid"), ("normal", "ppppppppppppp" + "iiiiii" + "d")),
 )  # fmt: skip
+
+
+def _write_row_slopes(module: Any, sizes: Any) -> None:
+    Windows(module, sizes["around"]).row_slopes("around")
+
+
+ROW_SLOPES = Purpose(
+    "row slopes", _write_row_slopes, (("around", "all"),), (("row_slopes", "pppi"),)
+)
 
 
 def _of(model: Any, purpose: Purpose, theta: np.ndarray, driven: int) -> Kernel | None:
@@ -63,6 +72,24 @@ def valuer(model: Any, theta: np.ndarray, driven: int) -> Callable[[np.ndarray],
         return found
 
     return of
+
+
+def row_slopes(model: Any, theta: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, ...] | None:
+    """ν̇ [n, 3], ∂ν̇/∂x [n, 3, 6], ∂ν̇/∂u [n, 3, D] and ∂ν̇/∂θ [n, 3, P] of rows (state, what drives)
+    [n, 6 + D]."""
+    driven = inputs.shape[1] - STATES
+    kernel = _of(model, ROW_SLOPES, theta, driven)
+    if kernel is None:
+        return None
+    rows = contiguous(inputs, len(inputs), STATES + driven)
+    by = Sizes(driven, len(theta), STATES + driven)
+    found = np.empty((len(rows), by.outputs))
+    c = kernel.prepared(model, theta)
+    if len(rows):
+        kernel.functions["row_slopes"](pointer(c), pointer(rows), pointer(found), len(rows))
+    by_inputs = found[:, by.slopes : by.by_theta].reshape(-1, 3, by.by)
+    by_theta = found[:, by.by_theta :].reshape(-1, 3, len(theta))
+    return found[:, :3], by_inputs[..., :STATES], by_inputs[..., STATES:], by_theta
 
 
 def rollout(model: Any, theta: np.ndarray, data: WindowSeries) -> np.ndarray | None:

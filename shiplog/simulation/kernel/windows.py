@@ -193,6 +193,25 @@ class Windows:
                 f.call(function, x, c, out)
                 rates.scattered([f.load_lanes(out, i) for i in range(3)], 0)
 
+    def row_slopes(self, function: str) -> None:
+        """All outputs of `function` [n, outputs] at inputs [n, columns of x]."""
+        arguments = [("c", POINTER), ("inputs", POINTER), ("found", POINTER), ("n", INT)]
+        with self.module.function("row_slopes", arguments) as (f, (c, inputs, found, n)):
+            count, lanes, width = self.sizes.outputs, self.module.lanes, self.sizes.inputs
+            x, out = f.reserve(width), f.reserve(count)
+            f.call(f"{function}_fill", c, out)
+            with f.loop(n, 0, lanes, outer=True) as first:
+                block = Block(f, first, n)
+                given, rows = block.rows(inputs, width), block.rows(found, count)
+                for i in range(width):
+                    f.store_lanes(given.gathered(i), x, i)
+                f.call(function, x, c, out)
+                whole = count // lanes * lanes
+                with f.loop(f.int(whole), 0, lanes) as at:
+                    rows.scattered([f.load_lanes(out, at + q) for q in range(lanes)], at)
+                with f.loop(f.int(count), whole) as at:
+                    rows.scattered([f.load_lanes(out, at)], at)
+
     def slopes(self, function: str) -> None:
         """States [N, I, 6] and their derivatives by all coefficients [N, I, 6, P]."""
         names = ["c", "start", "actuator", "wind", "dt", "states", "slopes", "work"]

@@ -12,7 +12,10 @@ import numpy as np
 import polars as pl
 
 from shiplog.exceptions import RunError, listed
-from shiplog.models import NETWORK, PHYSICS, compiled_network, mmg
+from shiplog.foreign import source
+from shiplog.foreign.logged import LoggedSimulator
+from shiplog.foreign.source import Source
+from shiplog.models import FOREIGN, NETWORK, PHYSICS, compiled_network, mmg
 from shiplog.models.causes import Cause
 from shiplog.models.coefficients import Parameters
 from shiplog.models.extended import Extended
@@ -22,10 +25,18 @@ from shiplog.models.starting_values import Start
 from shiplog.nomenclature.contract import CONTRACT
 from shiplog.simulation import force_breakdown, prediction_interval
 from shiplog.simulation.extended_simulator import ExtendedSimulator, Extension, campaign
+from shiplog.simulation.foreign_model import Failure, ForeignSimulator
 from shiplog.simulation.sailing import STILL, Water
 from shiplog.simulation.schedules import Manoeuvre
 from shiplog.simulation.sensitivities import Simulator
-from shiplog.training.runs import coefficients, extension_file, run_folder, sailing_run
+from shiplog.training.physics.stand_in import StandIn
+from shiplog.training.runs import (
+    coefficients,
+    extension_file,
+    foreign_run,
+    run_folder,
+    sailing_run,
+)
 from shiplog.training.runs.coefficients import Coefficient
 from shiplog.training.runs.run_folder import RunFolder
 from shiplog.training.settings import run_files
@@ -189,6 +200,22 @@ class Run(RunFolder, ABC):
     def lacks(self) -> str:
         """Why causes that change forces cannot be tested with it; empty where they can."""
         return ""
+
+    @property
+    def fixed(self) -> str:
+        """Why causes that change coefficients of the ship cannot be tested with it; empty where
+        they can."""
+        return ""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a diagnosis has to say of how it is judged, in sentences."""
+        return ()
+
+    @property
+    def failures(self) -> tuple[Failure, ...]:
+        """Where a simulator of the user's own failed so far; of all others, nowhere."""
+        return ()
 
     @abstractmethod
     def simulator(self, seed: int) -> Any:
@@ -365,15 +392,135 @@ class PhysicalRun(Run):
         return self._standing_in(plain.model, replace(plain.start, values=coefficients))
 
 
-RUNS = {NETWORK.name: NetworkRun, PHYSICS.name: PhysicalRun}
+@dataclass(frozen=True, repr=False)
+class ForeignRun(Run):
+    """A simulator of one's own, on which causes are tested directly. It has no coefficients: those
+    that causes change are of an MMG that was fitted to its accelerations.
+
+    source   its file, where it was given by hand in this call
+    """
+
+    source: Source | None = None
+
+    @property
+    def label(self) -> str:
+        if self.extension is None:
+            return super().label
+        causes = listed(c.label for c in self.extension.causes)
+        return f"{self.config.foreign.name} with {causes}"
+
+    @property
+    def failures(self) -> tuple[Failure, ...]:
+        """Where it failed so far."""
+        return tuple(foreign_run.failures(self.config.foreign))
+
+    @property
+    def fixed(self) -> str:
+        name, known = self.config.foreign.name, foreign_run.kept(self)
+        if not len(known.values):
+            return f"{self.profile.ship.name} has no MMG that could stand in for {name}"
+        if StandIn(known.values, known.misfit).poor:
+            return (
+                f"no MMG of the ship describes {name}: it leaves "
+                f"{float(np.median(known.misfit)):.0%} of its accelerations"
+            )
+        return ""
+
+    @property
+    def judges_itself(self) -> bool:
+        return True
+
+    def judge(self) -> Base:
+        return self.base()
+
+    @property
+    def logged(self) -> bool:
+        """Whether its states were logged: it can be asked nothing else."""
+        return self.config.foreign.kind == "logged"
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        of, misfit = self.config.foreign, foreign_run.kept(self).misfit
+        if self.logged:
+            return (
+                f"{of.name} was logged, and cannot be asked at other states: an MMG that was "
+                f"fitted to its accelerations is judged in its stead, and leaves "
+                f"{float(np.median(misfit)):.0%} of them.",
+            )
+        found = [f"Sensitivities of {of.name}: {of.derivatives}."]
+        if not self.fixed:
+            found.append(
+                "Causes that change the ship change an MMG that was fitted to its accelerations, "
+                f"and leaves {float(np.median(misfit)):.0%} of them."
+            )
+        return tuple(found)
+
+    def simulator(self, seed: int) -> Any:
+        if self.logged:
+            return LoggedSimulator(self.config.foreign.name, foreign_run.states(self))
+        none = np.zeros(0)
+        failures = foreign_run.failures(self.config.foreign)
+        return ForeignSimulator(self._model(), none, np.zeros((0, 0)), failures)
+
+    def accelerations(self, rows: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
+        """At so many of the training voyages' rows: (state, actuators, wind) [n, 6 + A + 2], and
+        its ν̇ there [n, 3]."""
+        if self.logged:
+            every, f = foreign_run.logged_accelerations(
+                foreign_run.states(self), self.training(), self.profile
+            )
+            step = max(1, len(every) // most)
+            return every[::step], f[::step]
+        some = rows[:: max(1, len(rows) // most)]
+        return some[:, :-1], self._model().accelerations(some[:, :6], some[:, 6:-1])
+
+    def spread(self, models: Mapping[int, Any], simulated: list[np.ndarray], cut: Windows) -> Any:
+        return next(iter(models.values())).spread(cut)
+
+    def forces(self, seconds: pl.DataFrame) -> None:
+        return None
+
+    def _model(self) -> Any:
+        of = self.config.foreign
+        return foreign_run.model(
+            self, self.source, lambda: source.absent(self.name, of.name, of.sha256)
+        )
+
+    def _numbers(self, seed: int) -> tuple[Any, np.ndarray, np.ndarray]:
+        model, start, _, _ = self._plain_base()
+        return model, start.values, np.zeros((len(start.values),) * 2)
+
+    def _plain_base(self) -> Base:
+        ship = mmg.begin(self.profile, self.config.physics)
+        values = foreign_run.kept(self).values
+        values = values if len(values) else ship.start.values
+        if self.logged:
+            held = np.full(len(values), HELD_SPREAD)
+            start = Start(values, held, ship.start.low, ship.start.high)
+            return Base(ship.model, start, ship.model, values)
+        none = np.zeros(0)
+        return Base(self._model(), Start(none, none, none, none), ship.model, values)
+
+    def _with_coefficients(self, plain: Base, coefficients: np.ndarray) -> Base:
+        return plain
 
 
-def of_folder(folder: RunFolder, causes: Sequence[Cause] = ()) -> Run:
-    """The models of a run folder: a NetworkRun or a PhysicalRun. Raises RunError.
+RUNS = {NETWORK.name: NetworkRun, PHYSICS.name: PhysicalRun, FOREIGN.name: ForeignRun}
 
-    causes   of the user's own, for a run that was extended by them; see `causes.user.load`
+
+def of_folder(
+    folder: RunFolder, causes: Sequence[Cause] = (), simulators: Sequence[str] = ()
+) -> Run:
+    """The models of a run folder: a NetworkRun, PhysicalRun or ForeignRun. Raises RunError.
+
+    causes       of the user's own, for a run that was extended by them; see `causes.user.load`
+    simulators   paths of simulators of one's own, for runs of them
     """
     run = RUNS[folder.kind.family.name](folder.path, folder.config, folder.profile)
+    if isinstance(run, ForeignRun):
+        of = folder.config.foreign
+        given = [source.read(one) for one in simulators]
+        run = replace(run, source=source.matching(given, folder.name, of.name, of.sha256))
     extension = extension_file.read(folder, causes)
     return run if extension is None else replace(run, extension=extension)
 
@@ -383,6 +530,6 @@ def network(folder: RunFolder) -> NetworkRun:
     return NetworkRun(folder.path, folder.config, folder.profile)
 
 
-def load(path: str | Path, causes: Sequence[Cause] = ()) -> Run:
+def load(path: str | Path, causes: Sequence[Cause] = (), simulators: Sequence[str] = ()) -> Run:
     """A finished run with its models, as `of_folder`. Raises RunError."""
-    return of_folder(run_folder.open_finished(Path(path)), causes)
+    return of_folder(run_folder.open_finished(Path(path)), causes, simulators)

@@ -17,7 +17,13 @@ from shiplog.exceptions import ModelError, listed
 from shiplog.nomenclature.channels import STATE, VELOCITY, WIND
 from shiplog.nomenclature.frames import in_body_axes
 from shiplog.ship_profile.profile import Profile
-from shiplog.simulation import coverage, discrepancy, prediction_interval, rollout
+from shiplog.simulation import (
+    coverage,
+    discrepancy,
+    foreign_model,
+    prediction_interval,
+    rollout,
+)
 from shiplog.simulation.controls import (
     STEERING_CAUSES,
     Controls,
@@ -94,7 +100,11 @@ class Sailor:
         self._physics = [_physics(run, seed) for seed in self._seeds]
         self.substeps = self._physics[0].substeps if self._physics[0] else 1
         # published or estimated coefficients are those of the equations, not of Euler's steps
-        self.heun = run.given
+        # a simulator's are, too
+        first = self._physics[0]
+        self.heun = run.given or (
+            first is not None and foreign_model.simulator_of(first.model) is not None
+        )
         self._controls: dict[tuple[float, float], Controls] = {}
         self.fitted_band = False  # whether its discrepancy is of voyages that it was fitted to
         self._roots: list[np.ndarray] | None = None
@@ -399,6 +409,11 @@ def _physics(run: Sails, seed: int) -> _Physics | None:
         return _Physics(found.model, found.theta, found.covariance, 1)
     if run.judges_itself:
         own = run.simulator(seed)
+        if not hasattr(own, "model"):
+            raise ModelError(
+                f"{run.name} is of states that were logged, and cannot be sailed on other orders.",
+                hint="give the simulator itself: shiplog train --model FILE.py or FILE.fmu.",
+            )
         return _Physics(own.model, own.theta, own.covariance, 0)
     return None
 

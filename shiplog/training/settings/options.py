@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from shiplog.exceptions import UsageError, listed, nearest
-from shiplog.models import FORCES, MODELS, PHYSICS, taking
+from shiplog.models import FORCES, MODELS, PHYSICS, TRAINED, taking
 from shiplog.nomenclature.channels import AUTO_WINDOW, LEAST_WINDOW
 from shiplog.training.settings.run_config import DEVICES, RECIPES, WIND_INPUTS, Config
 from shiplog.voyages.windows.augmentation import AUGMENTATIONS
@@ -66,7 +66,7 @@ class TrainOptions:
         """Raises UsageError for a word that names nothing, and for an option that says nothing to
         the model."""
         for value, allowed, option in (
-            (self.model, MODELS, "--model"),
+            (self.model, TRAINED, "--model"),
             (self.data, AUGMENTATIONS, "--data"),
             (self.recipe, RECIPES, "--recipe"),
             (self.device, DEVICES, "--device"),

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import tomli_w
 from pydantic import Field, ValidationError, model_validator
 
 from shiplog.exceptions import UnreadableError, listed
-from shiplog.models import FAMILIES, MODELS, NETWORK, ModelFamily
+from shiplog.models import FAMILIES, FOREIGN, MODELS, NETWORK, ModelFamily
 from shiplog.nomenclature.channels import LEAST_WINDOW
 from shiplog.ship_profile.toml_section import Section
 from shiplog.voyages.windows.split_settings import Split
@@ -70,6 +70,21 @@ class Physics(Section):
     strengths: tuple[float, ...] = (0.1, 0.3, 1.0)  # of it, to choose from on held-out voyages
 
 
+class Foreign(Section):
+    """A simulator of one's own: what it is. Its code stays where it is."""
+
+    name: str = ""  # of its file
+    sha256: str = ""
+    kind: Literal["callable", "fmu", "logged"] = "callable"
+    function: str = ""  # of a callable, where it is not f; of logged states, their topic
+    returns: str = ""  # derivative, acceleration or next state
+    step: float = 0.0  # s, its own; 0 where it has none
+    layout: str = ""  # how it takes many rows
+    derivatives: str = ""  # its own, or how differences are taken
+    place: bool = False  # whether its accelerations depend on where the ship is
+    mapping: dict[str, Any] = Field(default_factory=dict)  # of an FMU, as its TOML has it
+
+
 class Config(Section):
     """A run: which model learns what from which voyages, and how."""
 
@@ -86,6 +101,7 @@ class Config(Section):
     paper: Paper = Paper()
     fast: Fast = Fast()
     physics: Physics = Physics()
+    foreign: Foreign = Foreign()
 
     @model_validator(mode="before")
     @classmethod
@@ -102,6 +118,8 @@ class Config(Section):
         """What a legend says of the model in a word: the recipe, or the physics."""
         if self._family is NETWORK:
             return self.recipe
+        if self._family is FOREIGN:
+            return self.foreign.name
         return "identified" if self.physics.fit else "as given"
 
     def label(self, wind: bool) -> str:
@@ -109,6 +127,8 @@ class Config(Section):
         if self._family is NETWORK:
             how = f", wind {self.network.wind_input}" if wind else ""
             return f"{self.model} {self.data} ({self.recipe} recipe{how})"
+        if self._family is FOREIGN:
+            return f"{self.foreign.name}, a simulator of its own"
         data = "a trial sheet" if self.physics.sheet else self.data
         how = f"identified on {data}" if self.physics.fit else "as given"
         off = f", without {listed(self.physics.without)}" if self.physics.without else ""
