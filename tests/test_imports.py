@@ -35,7 +35,9 @@ ROOMS = {
         "rows", "clocks", "samples", "contradictions", "sensors", "ingest", "store", "windows",
     ),
     "training": ("settings", "network", "physics", "runs"),
-    "diagnosis": ("linear", "noise", "nominal", "trial", "hypotheses", "verdict", "residual"),
+    "diagnosis": (
+        "linear", "noise", "nominal", "trial", "hypotheses", "verdict", "onset", "residual",
+    ),
     "report": (
         "evaluation", "figures", "viewer", "diagnosis", "paper", "page", "gate", "fleet",
         "manoeuvres",
