@@ -36,11 +36,12 @@ ROOMS = {
     ),
     "training": ("settings", "network", "physics", "runs"),
     "diagnosis": (
-        "linear", "noise", "nominal", "trial", "hypotheses", "verdict", "onset", "residual",
+        "linear", "noise", "nominal", "trial", "hypotheses", "verdict", "onset", "season",
+        "residual",
     ),
     "report": (
         "evaluation", "figures", "viewer", "diagnosis", "paper", "page", "gate", "fleet",
-        "manoeuvres",
+        "manoeuvres", "season",
     ),
 }  # fmt: skip
 LEVEL = {name: level for level, name in enumerate(ROWS)}

@@ -23,6 +23,7 @@ from shiplog.cli import (
     report,
     simulate,
     train,
+    trend,
     voyages,
 )
 
@@ -38,6 +39,7 @@ COMMANDS = (
     evaluate.evaluate,
     compare.compare,
     diagnose.diagnose,
+    trend.trend,
     simulate.simulate,
     manoeuvres.manoeuvres,
     plan.plan,

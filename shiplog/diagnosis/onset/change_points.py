@@ -104,7 +104,7 @@ class Changes:
 
 def changes(y: np.ndarray, M: np.ndarray, places: Places) -> Changes:
     """p(i, j | r) of (19), y [B, q] and M [B, q, B, q] of (17)."""
-    B, q = y.shape
+    B = len(y)
     i, j = (of.ravel() for of in np.meshgrid(np.arange(B), np.arange(1, B + 1), indexing="ij"))
     kept = i < j
     i, j = i[kept], j[kept]

@@ -1,5 +1,5 @@
-"""Recorded time of a trial: its voyages one after another, in the order of their start, without what
-lies between them."""
+"""Recorded time of a trial: its voyages one after another, in the order of their start, without
+what lies between them."""
 
 from __future__ import annotations
 

@@ -15,7 +15,8 @@ from shiplog.report.figures.content import Content, Picture
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-MINUTES_S = 3600.0  # a trial that is longer has its axis in hours, else in minutes
+HOURS_S = 7200.0  # a trial that is longer has its axis in hours, else in minutes
+HALF = 0.5  # probability, from which "from the start" is the likelier answer
 TALL = 0.8  # of the row of a cause, from a probability of 0 to 1
 
 
@@ -54,19 +55,22 @@ def words(rows: pl.DataFrame, content: Content) -> str:
     for cause in content.verdict["causes"]:
         if (found := cause.get("onset")) is None:
             continue
-        said.append(
-            f"{spoken(cause['name'])} from {found['low']:.0f} to {found['high']:.0f} s at the "
-            f"earliest and latest (90 %), with probability {found['from_start']:.2f} from the start"
-        )
+        name = spoken(cause["name"])
+        if found["from_start"] >= HALF:
+            said.append(f"{name} is present from the start ({found['from_start']:.2f})")
+        else:
+            said.append(
+                f"{name} begins between {found['low']:.0f} and {found['high']:.0f} s (90 %)"
+            )
     return (
         "Height of each bar: the probability that the cause acts at that time; a dotted line is "
-        f"the start of a voyage. Beginning: {'; '.join(said)}."
+        f"the start of a voyage. {'; '.join(said)}."
     )
 
 
 def _unit(rows: pl.DataFrame) -> tuple[float, str]:
     longest = float(rows["end"].to_numpy().max())
-    return (3600.0, "h") if longest > 2.0 * MINUTES_S else (60.0, "min")
+    return (3600.0, "h") if longest > HOURS_S else (60.0, "min")
 
 
 OF_ONSET = Picture("Since when", table, draw, words, height=0.85, by_row=0.42, rows_of="cause")

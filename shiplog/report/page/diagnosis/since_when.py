@@ -56,7 +56,9 @@ def blocks(source: Source) -> list[Block]:
 def _row(cause: Mapping[str, Any]) -> tuple[Line, ...]:
     onset, off = cause["onset"], cause.get("off")
     since: Line = ["the start"]
+    between: Line = ["-"]
     if onset["from_start"] < HALF:
+        between = [seconds(onset["low"]), " to ", seconds(onset["high"])]
         since = [seconds(onset["start_s"]), f" of {onset['voyage']}"]
     until: Line = ["the end"]
     if off is not None:
@@ -65,7 +67,7 @@ def _row(cause: Mapping[str, Any]) -> tuple[Line, ...]:
             seconds(off["high"]), ")",
         ]  # fmt: skip
     return (
-        [spoken(cause["name"])], since, [seconds(onset["low"]), " to ", seconds(onset["high"])],
+        [spoken(cause["name"])], since, between,
         [probability(onset["from_start"])], until,
     )  # fmt: skip
 
