@@ -8,7 +8,6 @@ from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 
 from shiplog.commands.bars import reach, staged
@@ -18,13 +17,12 @@ from shiplog.diagnosis.trial import setup, trial_voyages
 from shiplog.diagnosis.trial.fitted import Fit
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.diagnosis.verdict import trial_decision
-from shiplog.exceptions import ShiplogError
 from shiplog.models.causes import Cause, user
 from shiplog.report.diagnosis import answer
 from shiplog.report.page import html
 from shiplog.report.result import Shown
 from shiplog.report.season import drawing, page
-from shiplog.report.season.season import NO_CAUSE, Season
+from shiplog.report.season.season import NO_CAUSE, UNDATED, Season
 from shiplog.training.runs import load_model
 from shiplog.training.runs.load_model import Run
 from shiplog.training.runs.run_checks import refuse_other_ship
@@ -65,27 +63,17 @@ def trend_of(
     there = [] if run.given else store.there(run.trained_on)
     nominal = trial_voyages.record_of(store, there, profile) if there else None
     nominal, recorded = trial_voyages.rescale_time(run, nominal, recorded)
-    _refuse_little(recorded)
+    season_fit.refuse_little(recorded, answer.enough(recorded))
     starts = voyage_starts.dated(store, names)
     trial, fit, labels = _followed(run, nominal, recorded, causes, [*of, *(limits or {})], store)
     reach("season")
-    try:
-        found = trends.of_fit(trial, fit, labels, starts, events, limits)
-    except np.linalg.LinAlgError as error:
-        raise ShiplogError(
-            "The causes could not be followed: the model diverges on these voyages.",
-            hint="see what `shiplog diagnose` says of them.",
-        ) from error
-    current = fit.estimate.numbers.get("current")
-    water = (0.0, 0.0) if current is None else (float(current[0]), float(current[1]))
+    found = trends.of_fit(trial, fit, labels, starts, events, limits)
+    water = season_fit.water_of(fit)
     losses = speed_loss.of_voyages(trial, trends.nominal_theta(trial), water)
     order = trial.record.names
     notes = [] if found else [NO_CAUSE]
     if len(starts) < len(names):
-        notes.append(
-            "Not every voyage has a date: there is no slope, no event and no limit, and voyages "
-            "stand in the order of their recorded time."
-        )
+        notes.append(UNDATED)
     if nominal is None:
         notes.append(answer.without_nominal(run, store.path))
     season = Season(run.name, profile.ship.name, order, starts, found, losses, tuple(notes))
@@ -93,14 +81,6 @@ def trend_of(
         lambda: drawing.Plots(season), lambda: html.render(page.of_season(season))
     )  # fmt: skip
     return replace(season, shown=shown)
-
-
-def _refuse_little(recorded: Record) -> None:
-    if not answer.enough(recorded):
-        raise ShiplogError(
-            f"Too little to follow a cause: {recorded.seconds:.0f} s can be used.",
-            hint="name more voyages with --voyages.",
-        )
 
 
 def _followed(

@@ -6,12 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.hypotheses.evaluate import evaluate
 from shiplog.diagnosis.hypotheses.hypothesis import name_of
 from shiplog.diagnosis.noise.remainder import RAISED, Remainder
 from shiplog.diagnosis.trial.fitted import Fit, Point, Start
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.exceptions import ShiplogError, UsageError, listed
+from shiplog.voyages.rows.recording import Record
 
 
 def labels_of(trial: Trial, wanted: Sequence[str]) -> tuple[str, ...]:
@@ -46,3 +48,19 @@ def fitted(trial: Trial, point: Point, labels: Sequence[str]) -> Fit:
             hint="follow fewer causes, or see what `shiplog diagnose` names.",
         )
     return fit
+
+
+def water_of(fit: Fit) -> tuple[float, float]:
+    """Velocity of the water along x₀ and y₀ [m/s], where a current is one of the causes."""
+    current = fit.estimate.numbers.get("current")
+    return (0.0, 0.0) if current is None else (float(current[0]), float(current[1]))
+
+
+def refuse_little(recorded: Record, enough: bool) -> None:
+    """Raises ShiplogError for voyages that are too short for a verdict, too."""
+    if not enough:
+        raise ShiplogError(
+            f"Too little to follow a cause: {recorded.seconds:.0f} s can be used, and "
+            f"{thresholds.LEAST_RECORD_S:.0f} s are needed.",
+            hint="name more voyages with --voyages.",
+        )

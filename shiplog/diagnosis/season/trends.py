@@ -9,13 +9,13 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
-from shiplog.diagnosis.onset import drift, stretch_information
+from shiplog.diagnosis.onset import stretch_information
 from shiplog.diagnosis.onset.drift import DAY_S, Slope
 from shiplog.diagnosis.season import limit, pooling, speed_loss, voyage_sizes
 from shiplog.diagnosis.season.pooling import Pooled, Voyages
 from shiplog.diagnosis.trial.fitted import Fit
 from shiplog.diagnosis.trial.trial import Trial
-from shiplog.exceptions import UsageError, listed
+from shiplog.exceptions import ShiplogError, UsageError, listed
 from shiplog.models.causes import Cause, ParameterEstimate, si
 
 TAIL = (0.05, 0.95)
@@ -97,13 +97,19 @@ def of_fit(
     events   dates at which every cause may have changed, such as dockings
     limits   label → limit of the first parameter, in its unit
 
-    Raises np.linalg.LinAlgError where a matrix is not positive definite.
+    Raises ShiplogError where the model diverges.
     """
     by = {c.label: c for c in trial.reference.model.causes}
-    return tuple(
-        _Season.of(trial, fit, by[label], starts, events).trend((limits or {}).get(label))
-        for label in labels
-    )
+    try:
+        return tuple(
+            _Season.of(trial, fit, by[label], starts, events).trend((limits or {}).get(label))
+            for label in labels
+        )
+    except np.linalg.LinAlgError as error:
+        raise ShiplogError(
+            "The causes could not be followed: the model diverges on these voyages.",
+            hint="see what `shiplog diagnose` says of them.",
+        ) from error
 
 
 @dataclass(frozen=True)

@@ -24,15 +24,15 @@ from shiplog.report.season import drawing
 from shiplog.report.season.season import Season, day, loss_cells, sentences, summary
 
 TERMS = (
-    "pooled: partial pooling. Voyages of one season are alike to a degree that the data "
-    "say; a voyage that says little is drawn towards the others (Gelman et al. 2013, Sec. 5.4).",
+    "pooled: partial pooling. Voyages of one season are alike to a degree that the data say; one "
+    "that says little is drawn towards the others (Gelman et al. 2013, Sec. 5.4).",
     "without pooling: the same likelihood, each voyage with a size of its own.",
     "calm speed: what the size changes of the model's steady speed ahead at the trial's mean "
     "revolutions, without wind.",
     "speed loss: measured speed through the water over that of the model at the same revolutions "
     "and in the same wind, less one; below zero is slower. Block averages, filtered for wind, "
-    "depth, rudder, steadiness and outliers in the sense of ISO 19030-2:2016; block length and wind "
-    "limit of a ship shorter than 100 m are scaled by Froude's law.",
+    "depth, rudder, steadiness and outliers in the sense of ISO 19030-2:2016; block length and "
+    "wind limit of a ship shorter than 100 m are scaled by Froude's law.",
     "limit: the date at which the trend passes it, if it goes on as it did.",
 )
 

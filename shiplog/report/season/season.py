@@ -25,6 +25,11 @@ NO_CAUSE = (
     "followed."
 )
 
+UNDATED = (
+    "Not every voyage has a date: there is no slope, no event and no limit, and voyages stand in "
+    "the order of their recorded time."
+)
+
 
 @dataclass(frozen=True, repr=False)
 class Season(Shows):
@@ -59,7 +64,7 @@ class Season(Shows):
         for trend in self.trends:
             found += [f"## {spoken(trend.label)}", "", _sizes(trend), "", *sentences(trend), ""]
         found += ["## Speed loss at equal revolutions", "", self._loss_table(), ""]
-        return found + [*self.notes]
+        return [*found, *self.notes]
 
     @property
     def json(self) -> dict:
@@ -125,7 +130,8 @@ def sentences(trend: Trend) -> list[str]:
     if (slope := trend.slope) is not None:
         found.append(
             f"Change of its {slope.parameter}: {figure(slope.value, 3)} a day (90 %: "
-            f"{figure(slope.low, 3)} to {figure(slope.high, 3)}), over {figure(slope.days, 3)} days."
+            f"{figure(slope.low, 3)} to {figure(slope.high, 3)}), over {figure(slope.days, 3)} "
+            "days."
         )
     found += [_event(one) for one in trend.events]
     return found + ([] if trend.limit is None else [limit_words(trend.limit)])
@@ -169,9 +175,8 @@ def _last(trend: Trend) -> str:
         return spoken(trend.label)
     last = trend.voyages[-1]
     sizes = listed(
-        f"{name.replace('_', ' ')} {figure(one.value, 3)} ({_between(one)}) {one.unit}".removesuffix(
-            " 1"
-        )
+        f"{name.replace('_', ' ')} {figure(one.value, 3)}"
+        f"{'' if one.unit == '1' else f' {one.unit}'} ({_between(one)})"
         for name, one in last.pooled.items()
     )
     return f"{spoken(trend.label)} on {last.voyage}: {sizes}"
