@@ -1,6 +1,6 @@
 """When hidden effects begin: the truth against the onset that a diagnosis gives.
 
-    python -m pipelines.experiments.onset_of_effects WORK [--cases 64] [--markdown PATH]
+    python -m pipelines.experiments.onset_of_effects WORK [--cases 64] [--first 0]
 
 Four ships of three families (`simulated_ship`, `other_families`), which share no equation with
 shiplog's model. Each is identified once from nominal voyages. Its trials are two short voyages with
@@ -280,6 +280,8 @@ def answer(ship: Ship, truth: Truth, number: int) -> dict[str, Any]:
         "shown": True, "found": found.begin.elapsed_s, "low": found.begin.low,
         "high": found.begin.high, "from_start": found.from_start, "ends": found.ends,
         "off": None if off is None else [off.elapsed_s, off.low, off.high],
+        "acting": [round(float(p), 4) for p in found.acting],
+        "edges": [round(float(at), 1) for at in found.edges],
     }  # fmt: skip
 
 
@@ -310,16 +312,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
     parser.add_argument("work", type=Path, help="a folder for ships and answers")
-    parser.add_argument("--cases", type=int, default=64)
+    parser.add_argument("--cases", type=int, default=64, help="the last one is below this")
+    parser.add_argument("--first", type=int, default=0, help="number of the first one")
     given = parser.parse_args(arguments)
     simulators = [Simulator(*one) for one in SHIPS]
     ships: dict[Simulator, Ship] = {}
-    answers = given.work / "answers.jsonl"
     given.work.mkdir(parents=True, exist_ok=True)
-    done = answers.read_text(encoding="utf-8").splitlines() if answers.exists() else []
+    answers = given.work / f"answers-{given.first}.jsonl"
+    done = len(answers.read_text(encoding="utf-8").splitlines()) if answers.exists() else 0
     with threadpool_limits(limits=1, user_api="blas"):
         for number, (of, truth) in enumerate(truths(simulators, given.cases)):
-            if number < len(done):
+            if number < given.first + done:
                 continue
             if of not in ships:
                 ships[of] = prepare(of, given.work)
@@ -327,8 +330,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
             print(json.dumps(found), flush=True)
             with answers.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(found) + "\n")
-    cases = [json.loads(line) for line in answers.read_text(encoding="utf-8").splitlines()]
-    print(json.dumps(summary(cases), indent=2))
+    every = [json.loads(line) for path in sorted(given.work.glob("answers-*.jsonl"))
+             for line in path.read_text(encoding="utf-8").splitlines()]  # fmt: skip
+    print(json.dumps(summary(every), indent=2))
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from straight import CAUSES
 
 from shiplog.diagnosis.noise.remainder import Remainder
 from shiplog.diagnosis.onset import change_points, drift, onsets, stretch_information
-from shiplog.diagnosis.onset.change_points import ALWAYS, Places
+from shiplog.diagnosis.onset.change_points import ALWAYS, EDGE, Places
 from shiplog.diagnosis.onset.recorded_time import elapsed
 from shiplog.diagnosis.trial.fitted import Estimate, Fit
 from shiplog.diagnosis.verdict.result import Named
@@ -102,7 +102,7 @@ def test_a_cause_is_dated_to_a_segment(first, last):
         size = found.while_on["size"]
         assert size.low - 0.1 < DRAG < size.high + 0.1
     if first == 4:  # in port, and of the later voyage
-        assert (found.begin.voyage, found.begin.start_s) == ("v1", 0.0)
+        assert (found.begin.voyage, found.begin.start_s) == ("v1", pytest.approx(0.0, abs=1e-3))
 
 
 def test_a_force_that_depends_on_time_is_not_taken_for_the_cause():
@@ -113,29 +113,46 @@ def test_a_force_that_depends_on_time_is_not_taken_for_the_cause():
 
 
 def test_without_data_the_probabilities_are_the_prior():
+    edge = 10.0 * EDGE
     places = Places(
-        np.array([5.0, 20.0, 25.0]), np.array([15.0, 20.0, 35.0]),
-        np.array([False, True, False]), 40.0,
+        np.array([5.0, 15.0, 25.0]) - edge, np.array([15.0, 25.0, 35.0]) + edge,
+        np.array([np.nan, 20.0, np.nan]), 10.0, 40.0,
     )  # fmt: skip
     found = change_points.changes(np.zeros((4, 1)), np.zeros((4, 1, 4, 1)), places)
     assert found.probability.sum() == pytest.approx(1.0)
     assert found.probability[0, 4] == pytest.approx(ALWAYS)
-    # half of the beginnings in port, the rest by the time: 10 s each of 20
-    assert found.probability[1:, 4] == pytest.approx(0.25 * np.array([0.25, 0.5, 0.25]))
-    assert found.probability[0, 1:4] == pytest.approx(0.125 * np.array([0.25, 0.5, 0.25]))
+    # half of the beginnings in port, the rest by the time: 10 s each of 30
+    prior = np.array([1.0, 1.0, 1.0]) / 6.0 + np.array([0.0, 0.5, 0.0])
+    assert found.probability[1:, 4] == pytest.approx(0.25 * prior)
+    assert found.probability[0, 1:4] == pytest.approx(0.125 * prior)
     pairs = np.array([found.probability[i, j] for i, j in ((1, 2), (1, 3), (2, 3))])
-    assert pairs == pytest.approx(0.125 * np.array([2.0, 1.0, 2.0]) / 5.0)
+    assert pairs == pytest.approx(0.125 * np.array([4.0, 1.0, 4.0]) / 9.0)
     assert found.acting[0] == pytest.approx(found.from_start)
 
 
 def test_quantiles_of_a_beginning_lie_between_the_stretches():
-    places = Places(np.array([5.0, 15.0]), np.array([15.0, 25.0]), np.zeros(2, bool), 30.0)
+    places = Places(
+        np.array([4.0, 14.0]), np.array([16.0, 26.0]), np.full(2, np.nan), 10.0, 30.0
+    )  # fmt: skip
     probability = np.zeros((3, 4))
-    probability[0, 3], probability[1, 3], probability[2, 3] = 0.2, 0.6, 0.2
+    probability[0, 3], probability[1, 3] = 0.2, 0.8
     found = change_points.Changes(probability, places)
-    # by hand: 0.5 = 0.2 + 0.6 part → half the first place; 0.05 is in the atom of the start
-    assert found.begin() == pytest.approx((10.0, 0.0, 15.0 + 10.0 * 0.15 / 0.2))
+    # by hand: 0.5 = 0.2 + 0.8 · 3/8 of 12 s; 0.05 is in the atom of the start
+    assert found.begin() == pytest.approx((8.5, 0.0, 4.0 + 12.0 * 0.75 / 0.8), abs=1e-4)
     assert found.stop() == pytest.approx((30.0, 30.0, 30.0))
+
+
+def test_a_change_in_port_is_at_the_seam_and_seldom_next_to_it():
+    """Two places of 10 s, of which one is a port: p(port) = ½, p(next to it) = ¼."""
+    places = Places(
+        np.array([4.0, 14.0]), np.array([16.0, 26.0]), np.array([np.nan, 20.0]), 10.0, 30.0
+    )  # fmt: skip
+    probability = np.zeros((3, 4))
+    probability[2, 3] = 1.0
+    middle, low, high = change_points.Changes(probability, places).begin()
+    assert middle == pytest.approx(20.0, abs=1e-4)
+    # a third is even over 12 s: 0.05 of it 1.8 s from either end
+    assert (low, high) == pytest.approx((15.8, 24.2), abs=1e-4)
 
 
 def test_a_slope_is_that_of_the_dense_regression():

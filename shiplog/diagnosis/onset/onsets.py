@@ -117,17 +117,16 @@ def onset(trial: Trial, told: Stretches, one: Named) -> Onset:
 
 def places_of(trial: Trial, first: np.ndarray) -> Places:
     """Where a change between stretches may be. One that is found before a stretch happened between
-    the middle of the last segment before it and the middle of its first one; between two voyages,
-    where the one ends."""
-    record, half = trial.record, 0.5 * trial.grid.seconds
-    begin = elapsed(trial.record, trial.rows)
-    stretch_ends = np.append(first[1:], len(trial.rows)) - 1
-    middle = 0.5 * (begin[first] + begin[stretch_ends]) + half
+    the middle of the last segment before it and the middle of its first one, or in the port between
+    two voyages."""
+    record, length = trial.record, trial.grid.seconds
+    begin = elapsed(record, trial.rows)
+    middle, edge = begin + 0.5 * length, change_points.EDGE * length
     voyage = record.voyage[trial.rows[first]]
-    port = np.diff(voyage) != 0
-    seam = begin[first[1:]]
-    low, high = np.where(port, seam, middle[:-1]), np.where(port, seam, middle[1:])
-    return Places(low, high, port, float(offsets(trial.record)[-1]))
+    seam = np.where(np.diff(voyage) != 0, offsets(record)[voyage[1:]], np.nan)
+    end = float(offsets(record)[-1])
+    low, high = middle[first[1:] - 1] - edge, middle[first[1:]] + edge
+    return Places(np.maximum(low, 0.0), np.minimum(high, end), seam, length, end)
 
 
 def _moment(trial: Trial, value: float, low: float, high: float) -> Moment:
