@@ -6,8 +6,6 @@ from collections.abc import Iterator, Sequence
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from shiplog.diagnosis.season.trends import Trend
 from shiplog.report import colours
 from shiplog.report.figures import style
@@ -118,12 +116,12 @@ def _axis(axes: Axes, dates: Sequence[datetime | None], names: Sequence[str]) ->
     if None not in dates:
         from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 
-        locator = AutoDateLocator(maxticks=6)
+        locator = AutoDateLocator(minticks=3)
         axes.xaxis.set_major_locator(locator)
         axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))
         return
     step = max(-(-len(names) // MOST_NAMES), 1)
-    shown = np.arange(0, len(names), step)
+    shown = range(0, len(names), step)
     axes.set_xticks(shown, [style.short(names[i], most=LONGEST) for i in shown], rotation=30,
                     ha="right", fontsize=7.0)  # fmt: skip
 
