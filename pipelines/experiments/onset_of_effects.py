@@ -47,6 +47,7 @@ from shiplog.diagnosis.trial import setup, trial_voyages
 from shiplog.diagnosis.trial.fitted import Fit, Start
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.diagnosis.verdict.result import Named
+from shiplog.nomenclature.numbers import figure
 from shiplog.training.runs import load_model
 from shiplog.training.settings.run_config import Config, Physics
 from shiplog.voyages.ingest.ingest import ingest
@@ -306,6 +307,24 @@ def summary(cases: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def table(cases: Sequence[Mapping[str, Any]]) -> str:
+    """A row a pattern and one of all, in Markdown."""
+    head = ("pattern", "cases", "shown", "interval holds the beginning", "median error [segments]",
+            '"from the start" right', "end found", "interval holds the end")  # fmt: skip
+    lines = [f"| {' | '.join(head)} |", f"| --- |{' ---: |' * (len(head) - 1)}"]
+    for pattern in ("start", "later", "on_off", "all"):
+        own = [one for one in cases if pattern in ("all", one["pattern"])]
+        of = summary(own)
+        error = "-" if of["error_segments"] is None else figure(of["error_segments"], 2)
+        cells = (
+            pattern.replace("_", " and "), of["cases"], of["shown"], f"{of['held']}/{of['later']}",
+            error, f"{of['start_right']}/{of['shown']}", f"{of['off_found']}/{of['on_off']}",
+            f"{of['off_held']}/{of['off_found']}",
+        )  # fmt: skip
+        lines.append(f"| {' | '.join(map(str, cells))} |")
+    return "\n".join(lines)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(
         prog="python -m pipelines.experiments.onset_of_effects", description=__doc__,
@@ -332,7 +351,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 file.write(json.dumps(found) + "\n")
     every = [json.loads(line) for path in sorted(given.work.glob("answers-*.jsonl"))
              for line in path.read_text(encoding="utf-8").splitlines()]  # fmt: skip
-    print(json.dumps(summary(every), indent=2))
+    print(table(every))
 
 
 if __name__ == "__main__":

@@ -74,14 +74,15 @@ class Limit:
 class Trend:
     """One cause over a season.
 
-    spread   τ: standard deviation from voyage to voyage, share of the cause's realistic size
+    spread   τ: standard deviation from voyage to voyage, share of the cause's realistic size; None
+             of one voyage
     slope    of causes that wear, where there are three dated voyages or more
     """
 
     label: str
     cause: Cause
     voyages: tuple[OfVoyage, ...]
-    spread: ParameterEstimate
+    spread: ParameterEstimate | None
     slope: Slope | None
     events: tuple[Event, ...]
     limit: Limit | None
@@ -149,9 +150,10 @@ class _Season:
             )
             for v, name in enumerate(self.names)
         )  # fmt: skip
+        spread = _summary(self.pooled.spread, "1") if len(voyages) > 1 else None
         return Trend(
-            self.cause.label, self.cause, voyages, _summary(self.pooled.spread, "1"),
-            self._slope(), self._events(), self._limit(limit_at),
+            self.cause.label, self.cause, voyages, spread, self._slope(), self._events(),
+            self._limit(limit_at),
         )  # fmt: skip
 
     def _date(self, days: float | None) -> datetime | None:

@@ -122,11 +122,13 @@ def _between(one: ParameterEstimate) -> str:
 
 def sentences(trend: Trend) -> list[str]:
     """Spread, slope, events and limit in words."""
-    spread = trend.spread
-    found = [
-        f"From voyage to voyage it varies by {figure(100.0 * spread.value, 2)} % of its realistic "
-        f"size (90 %: {figure(100.0 * spread.low, 2)} to {figure(100.0 * spread.high, 2)} %)."
-    ]
+    found = []
+    if (spread := trend.spread) is not None:
+        found.append(
+            f"From voyage to voyage it varies by {figure(100.0 * spread.value, 2)} % of its "
+            f"realistic size (90 %: {figure(100.0 * spread.low, 2)} to "
+            f"{figure(100.0 * spread.high, 2)} %)."
+        )
     if (slope := trend.slope) is not None:
         found.append(
             f"Change of its {slope.parameter}: {figure(slope.value, 3)} a day (90 %: "
@@ -187,7 +189,9 @@ def _last(trend: Trend) -> str:
 
 def _trend(one: Trend) -> dict[str, Any]:
     found: dict[str, Any] = {"name": name_of(one.label), "label": one.label}
-    found |= {"voyages": [_of_voyage(v) for v in one.voyages], "spread": as_json(one.spread)}
+    found["voyages"] = [_of_voyage(v) for v in one.voyages]
+    if one.spread is not None:
+        found["spread"] = as_json(one.spread)
     if one.slope is not None:
         found["slope"] = _slope(one.slope)
     found["events"] = [
