@@ -16,6 +16,7 @@ from shiplog.diagnosis.decision_parts import ALL, Parts
 from shiplog.diagnosis.linear import segments
 from shiplog.diagnosis.onset import onsets
 from shiplog.diagnosis.residual import error_location
+from shiplog.diagnosis.season import trends
 from shiplog.diagnosis.trial import trial_voyages
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.diagnosis.verdict import (
@@ -230,7 +231,9 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> Diagnosis:
         decision, found = decisions.without_simulation(decision), None
     elif held and decision.verdict in answer.OPEN and held.hint:
         notes.append(held.hint)
-    courses = onsets.of_decision(tried, decision, voyage_starts.dated(store, names))
+    starts = voyage_starts.dated(store, names)
+    courses = onsets.of_decision(tried, decision, starts)
+    seasons = trends.of_courses(tried, decision.named, courses, starts)
     simulated = (tried, decision)
     if network is not None:
         simulated = network.extended_by(decision)
@@ -254,6 +257,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> Diagnosis:
         alone,
         of.against,
         courses,
+        seasons,
     )
     after = held.extended(decision) if held and decision.named else None
     verdict = answer.verdict(tried, decision, found, held, context)

@@ -61,10 +61,14 @@ class Onset:
 
 @dataclass(frozen=True)
 class Course:
-    """What is said of one named cause: an onset, or a slope."""
+    """What is said of one named cause: an onset, or a slope.
+
+    told   its information in the stretches of the trial
+    """
 
     onset: Onset | None = None
     slope: Slope | None = None
+    told: Stretches | None = None
 
 
 def of_decision(
@@ -90,10 +94,10 @@ def _course(
 ) -> Course:  # fmt: skip
     told = stretch_information.of_cause(trial, decision.fit, one.cause.label)
     if one.cause.drifts:
-        return Course(slope=drift.slope(trial, told, one.cause, starts, one.freedom))
+        return Course(slope=drift.slope(trial, told, one.cause, starts, one.freedom), told=told)
     if len(told.first) < FEWEST:
-        return Course()
-    return Course(onset=onset(trial, told, one))
+        return Course(told=told)
+    return Course(onset=onset(trial, told, one), told=told)
 
 
 def onset(trial: Trial, told: Stretches, one: Named) -> Onset:

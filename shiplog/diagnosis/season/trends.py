@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,14 +12,18 @@ import numpy as np
 
 from shiplog.diagnosis.onset import stretch_information
 from shiplog.diagnosis.onset.drift import DAY_S, Slope
+from shiplog.diagnosis.onset.onsets import Course
+from shiplog.diagnosis.onset.stretch_information import Stretches
 from shiplog.diagnosis.season import limit, pooling, speed_loss, voyage_sizes
 from shiplog.diagnosis.season.pooling import Pooled, Voyages
 from shiplog.diagnosis.trial.fitted import Fit
 from shiplog.diagnosis.trial.trial import Trial
+from shiplog.diagnosis.verdict.result import Named
 from shiplog.exceptions import ShiplogError, UsageError, listed
 from shiplog.models.causes import Cause, ParameterEstimate, si
 
 TAIL = (0.05, 0.95)
+MOST_VOYAGES = 60  # of a verdict's view of its season
 WEARS = "ship"  # kind of causes that wear along a season: hull, screws, rudders
 BULK = (0.005, 0.995)  # of the draws: the calm speed of those beyond is that of the end
 CALM_GRID = 13  # sizes at which the model's calm speed is worked out; straight in between
@@ -103,7 +108,9 @@ def of_fit(
     by = {c.label: c for c in trial.reference.model.causes}
     try:
         return tuple(
-            _Season.of(trial, fit, by[label], starts, events).trend((limits or {}).get(label))
+            _Season.of(
+                trial, stretch_information.of_cause(trial, fit, label), by[label], starts, events
+            ).trend((limits or {}).get(label))
             for label in labels
         )
     except np.linalg.LinAlgError as error:
@@ -111,6 +118,25 @@ def of_fit(
             "The causes could not be followed: the model diverges on these voyages.",
             hint="see what `shiplog diagnose` says of them.",
         ) from error
+
+
+def of_courses(
+    trial: Trial, named: Sequence[Named], courses: Mapping[str, Course],
+    starts: Mapping[str, datetime],
+) -> dict[str, tuple[OfVoyage, ...]]:  # fmt: skip
+    """Label → each named cause of a verdict in each voyage; none of one voyage alone, or of very
+    many, of which `shiplog trend` has them."""
+    found: dict[str, tuple[OfVoyage, ...]] = {}
+    if not 2 <= len(trial.record.names) <= MOST_VOYAGES:
+        return found
+    for one in named:
+        course = courses.get(one.cause.label)
+        if course is None or course.told is None:
+            continue
+        with contextlib.suppress(np.linalg.LinAlgError):  # of a model that hardly is this ship's
+            season = _Season.of(trial, course.told, one.cause, starts)
+            found[one.cause.label] = season.voyages()
+    return found
 
 
 @dataclass(frozen=True)
@@ -128,10 +154,9 @@ class _Season:
 
     @classmethod
     def of(
-        cls, trial: Trial, fit: Fit, cause: Cause, starts: Mapping[str, datetime],
-        events: Sequence[datetime],
+        cls, trial: Trial, told: Stretches, cause: Cause, starts: Mapping[str, datetime],
+        events: Sequence[datetime] = (),
     ) -> _Season:  # fmt: skip
-        told = stretch_information.of_cause(trial, fit, cause.label)
         likelihood, names = voyage_sizes.by_voyage(trial, told, starts, events)
         dated = set(trial.record.names) <= set(starts)
         wears = cause.kind == WEARS and dated
@@ -140,9 +165,10 @@ class _Season:
         return cls(trial, cause, told.unit, likelihood, names, pooled, first,
                    tuple(sorted(events)) if dated else ())  # fmt: skip
 
-    def trend(self, limit_at: float | None) -> Trend:
+    def voyages(self) -> tuple[OfVoyage, ...]:
+        """The cause in each of them."""
         speed = self._speed_of()
-        voyages = tuple(
+        return tuple(
             OfVoyage(
                 name, self._date(float(self.of_voyages.days[v])),
                 self._estimates(self.pooled.sizes[:, v]), self._estimates(self.pooled.alone[:, v]),
@@ -150,6 +176,9 @@ class _Season:
             )
             for v, name in enumerate(self.names)
         )  # fmt: skip
+
+    def trend(self, limit_at: float | None) -> Trend:
+        voyages = self.voyages()
         spread = _summary(self.pooled.spread, "1") if len(voyages) > 1 else None
         return Trend(
             self.cause.label, self.cause, voyages, spread, self._slope(), self._events(),

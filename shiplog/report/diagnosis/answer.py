@@ -14,6 +14,7 @@ from shiplog.diagnosis.onset.onsets import Course
 from shiplog.diagnosis.residual import next_manoeuvre
 from shiplog.diagnosis.residual.interval import Interval
 from shiplog.diagnosis.residual.omitted_inputs import Dependence
+from shiplog.diagnosis.season.trends import OfVoyage
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.diagnosis.verdict import contradicted_causes
 from shiplog.diagnosis.verdict.held_out import HeldOut
@@ -60,6 +61,7 @@ class Context:
                     model is not fitted again together with the causes
     against         short stretches that contradict themselves
     courses         label → since when a named cause acts
+    seasons         label → a named cause in each voyage
     """
 
     run: Run
@@ -76,6 +78,7 @@ class Context:
     alone: float | None = None
     against: Sequence[Contradicted] = ()
     courses: Mapping[str, Course] = field(default_factory=dict)
+    seasons: Mapping[str, Sequence[OfVoyage]] = field(default_factory=dict)
 
 
 def verdict(
@@ -101,9 +104,12 @@ def verdict(
     unavailable = reasons.of(context.untested)
     advised = next_manoeuvre.advice(trial, decision.named, decision.nothing.point.numbers)
     causes = [
-        named_causes.of_named(n, advised.get(n.cause.label), context.courses.get(n.cause.label))
+        named_causes.of_named(
+            n, advised.get(n.cause.label), context.courses.get(n.cause.label),
+            context.seasons.get(n.cause.label, ()),
+        )
         for n in decision.named
-    ]
+    ]  # fmt: skip
     if decision.side_force is not None:
         times = intermittent.active_intervals(trial, decision.fit, decision.side_force)
         causes.append(named_causes.of_side_force(decision, times))

@@ -9,12 +9,15 @@ from dataclasses import dataclass
 from shiplog.diagnosis.hypotheses.hypothesis import name_of
 from shiplog.diagnosis.onset.onsets import Course
 from shiplog.diagnosis.residual.next_manoeuvre import Advice
+from shiplog.diagnosis.season.trends import OfVoyage
 from shiplog.diagnosis.verdict.result import SIDE_THRUST, Decision, Named
 from shiplog.exceptions import listed
 from shiplog.models.causes import ParameterEstimate
 from shiplog.nomenclature.numbers import NINETY_SPREADS, figure
 from shiplog.report.diagnosis.sections import onset as onsets
+from shiplog.report.diagnosis.sections import season
 from shiplog.report.diagnosis.sections.onset import Dated, Off, Onset, Slope
+from shiplog.report.diagnosis.sections.season import InVoyage
 from shiplog.report.evaluation.text_table import table
 
 # Of what it is: the part of a cause's label after the colon, by one or two words
@@ -90,6 +93,8 @@ class NamedCause:
     slope                   of a cause that grows, instead: `parameter`, `value`, `low`, `high`,
                             `unit`, `days`
     while_on                `parameters` while it acts, where that is not all the time
+    voyages                 of two voyages or more: `voyage`, `date`, `parameters` and, of what
+                            wears, `calm_speed_change` (%), by partial pooling
     """
 
     name: str
@@ -108,11 +113,13 @@ class NamedCause:
     off: Off | None = None
     slope: Slope | None = None
     while_on: Mapping[str, Estimate] | None = None
+    voyages: tuple[InVoyage, ...] | None = None
 
 
 def of_named(
-    named: Named, advice: Advice | None = None, course: Course | None = None
-) -> NamedCause:
+    named: Named, advice: Advice | None = None, course: Course | None = None,
+    voyages: Sequence[OfVoyage] = (),
+) -> NamedCause:  # fmt: skip
     alike = tuple(dict.fromkeys(name_of(label) for label in named.alike))
     tests = [named.cause.separated_by[n] for n in alike if n in named.cause.separated_by]
     advised = advice.words if advice else UNADVISED
@@ -133,6 +140,7 @@ def of_named(
         off=dated.off,
         slope=dated.slope,
         while_on=_estimates(dated.while_on),
+        voyages=season.of(voyages),
     )
 
 
@@ -196,6 +204,7 @@ def _lines(cause: NamedCause) -> list[str]:
     ]  # fmt: skip
     for line in onsets.lines(Dated(cause.onset, cause.off, cause.slope, cause.while_on)):
         lines += ["", line]
+    lines += season.lines(cause.voyages)
     if cause.indistinguishable_from:
         lines += [
             "", f"These data cannot tell it from {listed(cause.indistinguishable_from)}. "

@@ -9,6 +9,7 @@ from shiplog.report.diagnosis.sections.onset import HALF
 from shiplog.report.figures.bars import spoken
 from shiplog.report.page.blocks import (
     Block,
+    Fold,
     Gallery,
     Grid,
     Line,
@@ -42,6 +43,8 @@ def blocks(source: Source) -> list[Block]:
         found.append(Paragraph([RECORDED]))
     for one in dated:
         found += _while_on(one)
+    for one in causes:
+        found += _season(one)
     later = [one for one in dated if one["onset"]["from_start"] < HALF]
     if later:
         onset = later[0]["onset"]
@@ -82,6 +85,21 @@ def _while_on(cause: Mapping[str, Any]) -> list[Block]:
             number(one["high"], unit), "). The size above is that of the whole trial.",
         ]))  # fmt: skip
     return found
+
+
+def _season(cause: Mapping[str, Any]) -> list[Block]:
+    """The cause in each voyage."""
+    if not (voyages := cause.get("voyages")):
+        return []
+    rows = [
+        ([one["voyage"]], [(one.get("date") or "-")[:10]], [name.replace("_", " ")],
+         [number(size["value"], size["unit"])],
+         [number(size["low"], size["unit"]), " to ", number(size["high"], size["unit"])])
+        for one in voyages for name, size in one["parameters"].items()
+    ]  # fmt: skip
+    head = ("voyage", "date", "parameter", "value", "90 % interval")
+    title = f"{spoken(cause['name']).capitalize()} voyage by voyage, by partial pooling"
+    return [Fold(title, [Grid(head, rows, ("value",))])]
 
 
 def _growth(cause: Mapping[str, Any]) -> tuple[Line, ...]:
