@@ -110,19 +110,19 @@ class Changes:
         return self._quantiles(each[1:-1], first=0.0)
 
     def _quantiles(self, each: np.ndarray, first: float) -> tuple[float, float, float]:
-        """Of a change with p = `each` [B - 1], `first` at the start, and the rest at the end. What
-        is at sea is even between `low` and `high`; what is in port is at the seam."""
+        """Of a change with p = `each` [B - 1], `first` at the start, and the rest at the end. Each
+        is even between `low` and `high`; of a port half of it before the seam and half after it:
+        a segment that begins in port does not say how soon after that the cause began."""
         of = self.places
         knots = [(0.0, first)]  # position, and the probability that is added up to it
         for i in np.flatnonzero(each > NEGLIGIBLE):
-            port = of.in_port[i] / of.prior[i]
-            seam = of.seam[i] if port else of.high[i]
-            before = (seam - of.low[i]) / (of.high[i] - of.low[i])
-            knots += [
-                (of.low[i], 0.0), (seam, each[i] * (1.0 - port) * before), (seam, each[i] * port),
-                (of.high[i], each[i] * (1.0 - port) * (1.0 - before)),
-            ]  # fmt: skip
-        return tuple(_quantile(knots, p, of.end) for p in (0.5, TAIL, 1.0 - TAIL))  # type: ignore
+            middle = of.seam[i] if of.port[i] else 0.5 * (of.low[i] + of.high[i])
+            half = 0.5 * each[i]
+            knots += [(of.low[i], 0.0), (middle, half), (of.high[i], half)]
+        middle, low, high = (_quantile(knots, p, of.end) for p in (0.5, TAIL, 1.0 - TAIL))
+        if len(each) and each.max() >= 0.5 and of.port[each.argmax()]:
+            middle = float(of.seam[each.argmax()])  # in port, and not a moment next to it
+        return middle, low, high
 
 
 def _quantile(knots: Sequence[tuple[float, float]], p: float, end: float) -> float:
