@@ -34,6 +34,7 @@ if TYPE_CHECKING:
         sensors,
         simulate,
         train,
+        trend,
     )
     from shiplog.commands.compare import Comparison
     from shiplog.commands.convert import Converted, Draft
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
     from shiplog.report.fleet.fleet import Fleet
     from shiplog.report.manoeuvres.sheet import ManoeuvreSheet
     from shiplog.report.planning import Planned
+    from shiplog.report.season.season import Season
     from shiplog.report.simulation import Simulation
     from shiplog.training.runs.load_model import Run
     from shiplog.voyages.store.store import Store
@@ -67,6 +69,7 @@ __all__ = [
     "ManoeuvreSheet",
     "Planned",
     "Run",
+    "Season",
     "SensorComparison",
     "ShiplogError",
     "Simulation",
@@ -90,6 +93,7 @@ __all__ = [
     "sensors",
     "simulate",
     "train",
+    "trend",
 ]
 
 # Where a class is defined; functions are in `commands/api.py`.
@@ -106,6 +110,7 @@ _CLASSES = {
     "ManoeuvreSheet": "report.manoeuvres.sheet",
     "Planned": "report.planning",
     "Run": "training.runs.load_model",
+    "Season": "report.season.season",
     "SensorComparison": "commands.sensors",
     "ShiplogError": "exceptions",
     "Simulation": "report.simulation",

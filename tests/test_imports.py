@@ -37,10 +37,13 @@ ROOMS = {
         "rows", "clocks", "samples", "contradictions", "sensors", "ingest", "store", "windows",
     ),
     "training": ("settings", "network", "physics", "runs"),
-    "diagnosis": ("linear", "noise", "nominal", "trial", "hypotheses", "verdict", "residual"),
+    "diagnosis": (
+        "linear", "noise", "nominal", "trial", "hypotheses", "verdict", "onset", "season",
+        "residual",
+    ),
     "report": (
         "evaluation", "figures", "viewer", "diagnosis", "paper", "page", "gate", "fleet",
-        "manoeuvres",
+        "manoeuvres", "season",
     ),
 }  # fmt: skip
 LEVEL = {name: level for level, name in enumerate(ROWS)}

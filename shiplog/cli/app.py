@@ -24,6 +24,7 @@ from shiplog.cli import (
     report,
     simulate,
     train,
+    trend,
     voyages,
 )
 
@@ -39,6 +40,7 @@ COMMANDS = (
     evaluate.evaluate,
     compare.compare,
     diagnose.diagnose,
+    trend.trend,
     simulate.simulate,
     manoeuvres.manoeuvres,
     export.export,

@@ -9,7 +9,7 @@ function that needs it: a store opens in a tenth of a second.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from shiplog.report.fleet.fleet import Fleet
     from shiplog.report.manoeuvres.sheet import ManoeuvreSheet
     from shiplog.report.planning import Planned
+    from shiplog.report.season.season import Season
     from shiplog.report.simulation import Simulation
     from shiplog.simulation.schedules import Manoeuvre
     from shiplog.training.runs.load_model import Run
@@ -501,6 +502,34 @@ def find_manoeuvres(
     return finding.manoeuvres_of(
         _runs(runs), where, _names(voyages), _files(causes), scale=scale, members=members,
         full_load=full_load, simulators=_given(simulators),
+    )  # fmt: skip
+
+
+def trend(
+    run: AnyRun,
+    store: AnyStore = "store",
+    voyages: Names = (),
+    *,
+    of: Sequence[str] = (),
+    events: Sequence[str] = (),
+    limits: Mapping[str, float] | None = None,
+    causes: Files = (),
+) -> Season:
+    """Each cause's size voyage by voyage, and the ship's speed loss at equal revolutions.
+
+    of       causes to follow; unless given, those that a diagnosis of these voyages names
+    events   dates of dockings, cleanings and repairs, ISO 8601
+    limits   cause → limit of its parameter: {"thrust_loss": 0.9}
+
+    Raises ShiplogError.
+    """
+    from shiplog.commands import trend as following
+    from shiplog.diagnosis.season.trends import parse_date
+
+    (path,) = _runs(run)
+    return following.trend_of(
+        path, Store(_path(store)), _names(voyages), of=of, events=list(map(parse_date, events)),
+        limits=limits, cause_files=_files(causes),
     )  # fmt: skip
 
 

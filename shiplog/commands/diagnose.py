@@ -14,7 +14,9 @@ from threadpoolctl import threadpool_limits
 from shiplog.commands.bars import reach, staged
 from shiplog.diagnosis.decision_parts import ALL, Parts
 from shiplog.diagnosis.linear import segments
+from shiplog.diagnosis.onset import onsets
 from shiplog.diagnosis.residual import error_location
+from shiplog.diagnosis.season import trends
 from shiplog.diagnosis.trial import trial_voyages
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.diagnosis.verdict import (
@@ -51,7 +53,7 @@ from shiplog.training.runs.load_model import Run
 from shiplog.training.runs.provenance import portable, provenance
 from shiplog.training.runs.run_checks import refuse_other_ship
 from shiplog.voyages.rows.recording import Record
-from shiplog.voyages.store import contradicted, parts
+from shiplog.voyages.store import contradicted, parts, voyage_starts
 from shiplog.voyages.store.contradicted import Contradicted
 from shiplog.voyages.store.store import Store
 from shiplog.voyages.windows.windows import Windows
@@ -236,6 +238,9 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> Diagnosis:
         decision, found = decisions.without_simulation(decision), None
     elif held and decision.verdict in answer.OPEN and held.hint:
         notes.append(held.hint)
+    starts = voyage_starts.dated(store, names)
+    courses = onsets.of_decision(tried, decision, starts)
+    seasons = trends.of_courses(tried, decision.named, courses, starts)
     simulated = (tried, decision)
     if network is not None:
         simulated = network.extended_by(decision)
@@ -258,10 +263,14 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> Diagnosis:
         error_location.find_omitted_inputs(simulated[0], simulated[1].nothing, whole),
         alone,
         of.against,
+        courses,
+        seasons,
     )
     after = held.extended(decision) if held and decision.named else None
     verdict = answer.verdict(tried, decision, found, held, context)
-    return Diagnosis(verdict, out, decision, tried, simulated, whole, held, after)
+    return Diagnosis(
+        verdict, out, decision, tried, simulated, whole, held, after, courses=courses
+    )  # fmt: skip
 
 
 def _excluded(of: Campaigns) -> dict[str, str]:

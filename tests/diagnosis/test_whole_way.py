@@ -13,6 +13,7 @@ import sailing
 from contract_shape import shaped
 from whole_way import PROFILE, apart, labels, truth
 
+import shiplog
 from shiplog.commands import diagnose as pipeline
 from shiplog.commands.prepare import ingest_logs
 from shiplog.diagnosis.hypotheses import evidence
@@ -24,7 +25,7 @@ from shiplog.diagnosis.trial.fitted import Fit, Start
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.diagnosis.verdict import exchanged_twins, sign_conventions
 from shiplog.diagnosis.verdict.held_out import HeldOut
-from shiplog.exceptions import RunError
+from shiplog.exceptions import RunError, UsageError
 from shiplog.voyages.contradictions import twins
 from shiplog.voyages.store.store import Store
 
@@ -282,3 +283,34 @@ def test_the_models_error_in_the_wind_tells_no_wind_force_from_an_anemometers_sc
     assert trial.covering(scaled).cut.factors["wind"] == pytest.approx(np.full(3, 1.2**-2))
     one, other = (evidence.level(trial, point, 1.0).value for point in (measured, scaled))
     assert other == pytest.approx(one, abs=np.log(10.0))  # a name needs a probability of 0.9
+
+
+def test_the_current_is_present_from_the_start(sea):
+    """It acts in both trial voyages from their first row on."""
+    (cause,) = sea.done.verdict.as_json()["causes"]
+    onset = cause["onset"]
+    assert onset["from_start"] > 0.9
+    assert {"elapsed_s", "low", "high", "voyage", "start_s"} < set(onset)
+    assert onset["elapsed_s"] == 0.0 and "off" not in cause
+    written = json.loads((sea.work / "out" / "verdict.json").read_text(encoding="utf-8"))
+    assert written["causes"][0]["onset"] == onset
+    assert not sea.done.courses["current"].onset.while_on
+
+
+def test_a_season_follows_the_current_through_the_voyages(sea):
+    """The same current in both voyages, by the API, with its page and its JSON."""
+    found = shiplog.trend(sea.run, sea.store, "trial_*", of=["current"])
+    (trend,) = found.trends
+    true = truth(sea.case)
+    assert [one.voyage for one in trend.voyages] == list(found.voyages)
+    for one in trend.voyages:
+        assert one.pooled["speed"].value == pytest.approx(true["speed"], rel=0.1)
+        assert apart(one.pooled["direction"].value, true["direction"]) < 5.0
+        assert one.speed is None  # it is the water, and not the ship
+    assert trend.spread.high < 0.5 and trend.slope is None
+    written = json.loads(json.dumps(found.json))
+    assert [c["name"] for c in written["causes"]] == ["current"]
+    assert {v["voyage"] for v in written["voyages"]} == set(found.voyages)
+    assert "<svg" in found.shown.page() and "| voyage" in found.text
+    with pytest.raises(UsageError, match="current can have no limit"):
+        shiplog.trend(sea.run, sea.store, "trial_*", of=["current"], limits={"current": 0.1})

@@ -14,7 +14,14 @@ from shiplog.report import viewer
 from shiplog.report.diagnosis import diagnosis_pictures
 from shiplog.report.viewer import diagnosis, trajectory
 from shiplog.report.viewer.comparison_data import MadeFast
-from shiplog.report.viewer.diagnosis_data import AFTER, BEFORE, ERROR_COLUMNS, TRACKS, Exhibit
+from shiplog.report.viewer.diagnosis_data import (
+    ACTING,
+    AFTER,
+    BEFORE,
+    ERROR_COLUMNS,
+    TRACKS,
+    Exhibit,
+)
 
 BLUE, ORANGE, BLACK = 0x0072B2FF, 0xD55E00FF, 0x191919FF
 
@@ -262,3 +269,19 @@ def test_a_rollout_that_ran_away_does_not_flatten_the_errors(exhibit):
 def test_the_report_is_written_in_letters_that_rerun_has(saved):
     (output,) = column(saved, "/report", "TextDocument:text").explode()
     assert output == "# Diagnosis\n\n    R'V of 0.1 m/s\n"
+
+
+def test_the_probability_that_a_cause_acts_is_level_over_each_stretch(exhibit, tmp_path):
+    """Off for a minute, then on: lines at 0 and at 1, in a view of the voyage's tab."""
+    acting = pl.DataFrame(
+        [("heading_offset", "out", t, p) for t, p in ((0.0, 0), (60.0, 0), (60.0, 1), (200.0, 1))],
+        ACTING, orient="row",
+    )  # fmt: skip
+    dated = replace(exhibit, acting=acting)
+    path = tmp_path / "diagnosis.rrd"
+    viewer.save_diagnosis(dated, path)
+    assert scalars(path, "/acting/out/heading_offset").tolist() == [0.0, 0.0, 1.0, 1.0]
+    tabs = {tab.name: tab for tab in diagnosis.blueprint(diagnosis.pictured(dated))}
+    name = "probability that each named cause acts"
+    assert name in [view for view, _ in views([tabs["out"]])]
+    assert name not in [view for view, _ in views([tabs["home"]])]

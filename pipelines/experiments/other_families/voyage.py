@@ -54,6 +54,7 @@ def sail(
     ship: Ship, duration: float, *, seed: int, wind: Wind, effects: Effects | None = None,
     campaign: tuple[float, float] = (0.0, 1.0), helm: Helm | None = None,
     start: tuple[float, ...] | None = None, quiet: bool = False,
+    acts: tuple[float, float] = (0.0, math.inf),
 ) -> Voyage:  # fmt: skip
     """Sail for `duration` s.
 
@@ -61,6 +62,8 @@ def sail(
     helm      a random `Operator` of this seed unless given
     start     x₀, y₀, ψ, u, v, r; at rest near the middle unless given
     quiet     no process noise
+    acts      from when to when what is hidden acts on the ship [s]; instruments know no such time,
+              nor does a ship with equations of motion of its own
 
     Weather, noise, pulses and operator draw from streams of their own: the same seed meets the
     same gusts whatever is hidden.
@@ -92,7 +95,7 @@ def sail(
             campaign,
         )  # fmt: skip
     else:
-        track = _integrate(ship, effects, start, rows, steer, air, push, campaign, duration)
+        track = _integrate(ship, effects, start, rows, steer, air, push, campaign, duration, acts)
     time = PERIOD * np.arange(round(duration / PERIOD) + 1)
     seen = _at(track, step, time)
     blowing = air if public else air[::2]
@@ -127,16 +130,20 @@ def _at(track: np.ndarray, step: float, time: np.ndarray) -> np.ndarray:
     return seen
 
 
-def _integrate(ship: Ship, e: Effects, start, rows, steer, air, push, campaign, duration):
+def _integrate(
+    ship: Ship, e: Effects, start, rows, steer, air, push, campaign, duration, acts
+):  # fmt: skip
     count, step = len(ship.actuators), ship.step
     track = np.zeros((rows + 1, motion.STATE + 2 * count + (roll.STATES if ship.roll else 0)))
     track[0, :6] = start
     drive = drives_of(ship)
-    h, c = hidden_of(ship, e, campaign, duration), with_rudders(ship, e.rudder_force)
+    acting = hidden_of(ship, e, campaign, duration), with_rudders(ship, e.rudder_force)
+    nothing = hidden_of(ship, Effects(), campaign, duration), with_rudders(ship, 0.0)
     watch = round(WATCH / step)
     for first in range(0, rows, watch):
         order = np.asarray(steer(first * step, track[first].copy()), float)
         steps = min(watch, rows - first)
+        h, c = acting if acts[0] <= first * step < acts[1] else nothing
         if ship.roll:
             roll.advance(
                 ship.forces, c, ship.body, ship.roll, ship.windage, drive, h, track, first, steps,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,6 +61,7 @@ def sail(
     start: tuple[float, ...] | None = None,
     campaign: tuple[float, float] = (0.0, 1.0),
     step: float = physics.STEP,
+    acts: tuple[float, float] = (0.0, math.inf),
 ) -> Voyage:
     """Sail for `duration_s`, integrated at `step` and kept at 10 Hz.
 
@@ -67,6 +69,7 @@ def sail(
     helm      who steers; a random `Operator` of this seed unless given, asked once a second
     start     x₀, u, y₀, v, ψ, r; near the middle and at rest unless given
     campaign  which share of a campaign this voyage is, for effects that grow along it
+    acts      from when to when what is hidden acts on the ship [s]; instruments know no such time
 
     Weather and operator each draw from a stream of their own: the same seed meets the same gusts
     whatever is hidden.
@@ -90,11 +93,13 @@ def sail(
     push = unexplained(pulses, effects.turbulence, laws, duration_s, halves, noise_rng)
     numbers = physics.coefficients(ship, laws)
     hidden = physics.hidden(effects, campaign, duration_s)
+    nothing = physics.hidden(Effects(), campaign, duration_s)
     watch = round(WATCH / step)
     for first in range(0, rows, watch):
         order = np.array(steer(first * step, track[first].copy()), float)
         steps = min(watch, rows - first)
-        physics.advance(numbers, hidden, track, first, steps, step, order, air, push)
+        now = hidden if acts[0] <= first * step < acts[1] else nothing
+        physics.advance(numbers, now, track, first, steps, step, order, air, push)
 
     seen, (from_north, from_east) = track[::kept], air[:: 2 * kept].T
     return _observed(ship, effects, duration_s, seen, from_north, from_east, pulses)

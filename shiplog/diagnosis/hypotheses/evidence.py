@@ -105,7 +105,7 @@ def solve(
     Raises np.linalg.LinAlgError where A is not positive definite.
     """
     c = trial.reference.counts
-    chosen = np.append(0, 1 + _columns(trial, included, remainder))
+    chosen = np.append(0, 1 + columns_of(trial, included, remainder))
     G = (c * G)[np.ix_(chosen, chosen)]
     prior = _prior(trial, point, included, remainder)
 
@@ -185,7 +185,7 @@ def _prior(
     return _Prior(P_inv, P_inv_mu, square, ref.information_volume + float(np.log(precision).sum()))
 
 
-def _columns(trial: Trial, included: Sequence[str], remainder: Remainder) -> np.ndarray:
+def columns_of(trial: Trial, included: Sequence[str], remainder: Remainder) -> np.ndarray:
     """[N] columns of H among the trial's C: all nominal numbers, causes, a family's weights."""
     ref = trial.reference
     causes = (ref.columns.indices[name] for name in included)

@@ -62,7 +62,7 @@ class Products:
         reference = self.campaign.reference
         unit = np.append(reference.columns.unit, np.ones(self.omitted.count))
         return part_products.passes(
-            point.linear, reference.process_noise, self.parts, unit, weight, self._accelerations
+            point.linear, reference.process_noise, self.parts, unit, weight, self.accelerations
         )
 
     def _passes_of_first(self, first: Point, weight: np.ndarray) -> Sequence[PartPass]:
@@ -77,7 +77,7 @@ class Products:
             self.cache.first = kept = ref(first.path), key, passes
         return kept[2]
 
-    def _accelerations(self, cut: Cut) -> np.ndarray:
+    def accelerations(self, cut: Cut) -> np.ndarray:
         """Φ of the discrepancy: a weight w acts as an acceleration Φ w."""
         misfit = self.campaign.reference.misfit
         of = [] if misfit is None else [misfit.accelerations(cut, self.grid)]
@@ -95,14 +95,14 @@ class Products:
         reference; those of the families that no campaign shows are there where the remainder is
         one of them, since they are a quarter of all."""
         of = self.process_noise(point.linear.cut, noise, remainder)
-        prior, size = of.inverse_kernels(self.grid.nodes), 1 + len(self._deviation(remainder))
+        prior, size = of.inverse_kernels(self.grid.nodes), 1 + len(self.deviation(remainder))
         for one in self._passes(point, weight):
             yield one.gram(prior, size)
 
     def total(self, point: Point, noise: float, weight: np.ndarray, remainder: Remainder) -> Total:
         """G [1 + C, 1 + C] of all parts (4), C as in `each_part`, and log|R| (5)."""
         key = (noise, weight.tobytes(), remainder.shape)
-        size = 1 + len(self._deviation(remainder))
+        size = 1 + len(self.deviation(remainder))
         if kept := self._kept(point, key, size):
             return kept
         found = self._added(point, noise, weight, remainder)
@@ -186,12 +186,12 @@ class Products:
         """G of each voyage with b_k and c_v integrated out (4), and its share of log|R| (5) but for
         instruments and starts."""
         each = self.each_part(point, noise, weight, remainder)
-        deviation = self._deviation(remainder)
+        deviation = self.deviation(remainder)
         return campaign_prior.each_voyage(
             each, self.voyage, self.campaign.apart * deviation, deviation
         )
 
-    def _deviation(self, remainder: Remainder) -> np.ndarray:
+    def deviation(self, remainder: Remainder) -> np.ndarray:
         """The diagonal of D^½ [C]; of the families that no campaign shows there is none."""
         of = self.campaign.effects.deviation
         more = self.omitted.count if remainder.kind in discrepancy.OMITTED else 0

@@ -183,6 +183,8 @@ class Cause:
     first_step: ClassVar[float] = 0.0
     unit_error: ClassVar[float] = 0.0  # share by which the unit of its numbers may be wrong
     form_error: ClassVar[float] = 0.0  # share of its force that its equations may leave wrong
+    drifts: ClassVar[bool] = False  # it grows with time: it has a slope, and no onset
+    over_trial: ClassVar[bool] = False  # its first number is a change over the trial
     forms: ClassVar[int] = 0  # of its equations, factors that are uncertain: `FORM_SPREAD`
 
     @property

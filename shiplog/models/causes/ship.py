@@ -59,6 +59,7 @@ class Fouling(_Factor):
     and 0.34, 0.52 and 0.80 with more and more shells (Schultz 2007): 0.46 in the mean square."""
 
     name = "fouling"
+    drifts = True
     story = "The hull resistance has changed by fouling."
     equation = "X'₀, X'_u·{factor:.2f}"
     remedy = (
@@ -189,6 +190,7 @@ class ThrustDrift(Cause):
     """Size: within a campaign, two thirds of what a screw loses for good (`ThrustLoss`)."""
 
     name = "thrust_drift"
+    drifts = over_trial = True
     kind = "ship"
     needs = ("thrust",)
     story = "The thrust changes from voyage to voyage."

@@ -10,9 +10,11 @@ from pathlib import Path
 from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.hypotheses import intermittent
 from shiplog.diagnosis.linear import segments
+from shiplog.diagnosis.onset.onsets import Course
 from shiplog.diagnosis.residual import next_manoeuvre
 from shiplog.diagnosis.residual.interval import Interval
 from shiplog.diagnosis.residual.omitted_inputs import Dependence
+from shiplog.diagnosis.season.trends import OfVoyage
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.diagnosis.verdict import contradicted_causes
 from shiplog.diagnosis.verdict.held_out import HeldOut
@@ -58,6 +60,8 @@ class Context:
     alone           share of the error that a second fit without any cause removes; None where the
                     model is not fitted again together with the causes
     against         short stretches that contradict themselves
+    courses         label → since when a named cause acts
+    seasons         label → a named cause in each voyage
     """
 
     run: Run
@@ -73,6 +77,8 @@ class Context:
     unseen: Sequence[Dependence] = ()
     alone: float | None = None
     against: Sequence[Contradicted] = ()
+    courses: Mapping[str, Course] = field(default_factory=dict)
+    seasons: Mapping[str, Sequence[OfVoyage]] = field(default_factory=dict)
 
 
 def verdict(
@@ -97,7 +103,13 @@ def verdict(
     rejected = {k: why for k, why in rejected.items() if k not in named}
     unavailable = reasons.of(context.untested)
     advised = next_manoeuvre.advice(trial, decision.named, decision.nothing.point.numbers)
-    causes = [named_causes.of_named(n, advised.get(n.cause.label)) for n in decision.named]
+    causes = [
+        named_causes.of_named(
+            n, advised.get(n.cause.label), context.courses.get(n.cause.label),
+            context.seasons.get(n.cause.label, ()),
+        )
+        for n in decision.named
+    ]  # fmt: skip
     if decision.side_force is not None:
         times = intermittent.active_intervals(trial, decision.fit, decision.side_force)
         causes.append(named_causes.of_side_force(decision, times))

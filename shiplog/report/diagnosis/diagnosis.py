@@ -9,6 +9,7 @@ from pathlib import Path
 import polars as pl
 
 from shiplog.diagnosis.linear.linear_segments import Linear
+from shiplog.diagnosis.onset.onsets import Course
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.diagnosis.verdict.held_out import HeldOut
 from shiplog.diagnosis.verdict.result import Decision
@@ -36,6 +37,7 @@ class Diagnosis(Shows):
     drawn      whether the pictures could be drawn
     shown      its pictures and its page
     extended   the run with the causes in it, where one was asked for and a cause is named
+    courses    label of each named cause → since when it acts
     datums     voyage → latitude and longitude [deg] of its x₀ = y₀ = 0, where its log had them
     """
 
@@ -51,6 +53,7 @@ class Diagnosis(Shows):
     extended: Run | None = None
     shown: Shown | None = None
     datums: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    courses: Mapping[str, Course] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         named = ", ".join(self.named) or "no cause"

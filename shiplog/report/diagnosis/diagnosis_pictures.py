@@ -12,6 +12,7 @@ from shiplog.diagnosis.linear import linearisation, segment_nodes
 from shiplog.diagnosis.linear.measurement_correction import corrected
 from shiplog.diagnosis.noise import residual_acceleration
 from shiplog.diagnosis.noise.residual_acceleration import means_about
+from shiplog.diagnosis.onset.recorded_time import offsets
 from shiplog.diagnosis.residual import external_forces
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.diagnosis.verdict.result import SIDE_THRUST, Decision
@@ -20,7 +21,14 @@ from shiplog.nomenclature.channels import STATE, VELOCITY
 from shiplog.report.diagnosis import page
 from shiplog.report.diagnosis.diagnosis import Diagnosis
 from shiplog.report.viewer.comparison_data import Current, MadeFast
-from shiplog.report.viewer.diagnosis_data import AFTER, BEFORE, ERROR_COLUMNS, TRACKS, Exhibit
+from shiplog.report.viewer.diagnosis_data import (
+    ACTING,
+    AFTER,
+    BEFORE,
+    ERROR_COLUMNS,
+    TRACKS,
+    Exhibit,
+)
 from shiplog.voyages.rows.recording import Record
 from shiplog.voyages.windows.windows import Windows
 
@@ -51,7 +59,23 @@ def exhibit(done: Diagnosis) -> Exhibit:
         datums=done.datums,
         current=_current(decision),
         made_fast=_made_fast(decision),
+        acting=_acting(done),
     )
+
+
+def _acting(done: Diagnosis) -> pl.DataFrame:
+    """P(acts) of each named cause, level over each stretch, in its voyage's own time."""
+    assert done.trial is not None
+    record = done.trial.record
+    begins = dict(zip(record.names, offsets(record).tolist(), strict=False))
+    rows = []
+    for label, course in done.courses.items():
+        if (onset := course.onset) is None:
+            continue
+        ends = zip(onset.edges[:-1].tolist(), onset.edges[1:].tolist(), strict=True)
+        for voyage, p, (begin, end) in zip(onset.voyages, onset.acting.tolist(), ends, strict=True):
+            rows += [(label, voyage, at - begins[voyage], p) for at in (begin, end)]
+    return pl.DataFrame(rows, ACTING, orient="row")
 
 
 def _current(decision: Decision) -> Current | None:

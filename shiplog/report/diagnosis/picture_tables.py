@@ -59,6 +59,7 @@ def of_diagnosis(
         "made_fast": () if fast is None else (fast.point, fast.low, fast.high),
         "models": models, "named": exhibit.named, "errors": _errors(exhibit),
         "residual": exhibit.residual, "tracks": _tracks(exhibit, cut), "band": _band(run, cut),
+        "acting": _acting(done),
     }  # fmt: skip
     return picture_data.typed(replace(data, **found))
 
@@ -88,6 +89,19 @@ def _tracks(exhibit: Exhibit, cut: Windows | None) -> pl.DataFrame:
     numbered = diagnosis_pictures.numbered(cut)
     measured = diagnosis_pictures.tracks(MEASURED, cut.state, numbered, cut)
     return pl.concat([measured, exhibit.tracks])
+
+
+def _acting(done: Diagnosis) -> pl.DataFrame:
+    """A row a stretch of each named cause that has an onset."""
+    rows = [
+        (label, voyage, begin, end, p)
+        for label, course in done.courses.items() if (onset := course.onset) is not None
+        for voyage, begin, end, p in zip(
+            onset.voyages, onset.edges[:-1].tolist(), onset.edges[1:].tolist(),
+            onset.acting.tolist(), strict=True,
+        )
+    ]  # fmt: skip
+    return pl.DataFrame(rows, SCHEMAS["acting"], orient="row")
 
 
 def _band(run: Run, cut: Windows | None) -> pl.DataFrame:

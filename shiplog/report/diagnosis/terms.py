@@ -13,6 +13,8 @@ TERMS = (
     ("cannot tell it from", "Two causes change these voyages in the same way, within their noise."),
     ("outside the catalogue", "Something acts that none of the known causes explains; the word in "
      "brackets is what it depends on."),
+    ("recorded time", "The voyages one after another, in the order of their start, without what "
+     "lies between them."),
     ("missing force", "The force by which the model's acceleration differs from the ship's."),
     ("realistic size", "Of a cause: the size that changes found on real ships have, from the "
      "literature."),

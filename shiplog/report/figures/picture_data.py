@@ -46,7 +46,12 @@ SCHEMAS: Mapping[str, dict[str, Any]] = {
         "wind_speed": pl.Float64, "wind_from": pl.Float64,
     },
     "band": {"elapsed": pl.Float64, "position": pl.Float64, "heading": pl.Float64},
+    "acting": {
+        "cause": pl.String, "voyage": pl.String, "begin": pl.Float64, "end": pl.Float64,
+        "probability": pl.Float64,
+    },
 }  # fmt: skip
+LATER = ("acting",)  # tables that older results do not have
 
 
 def empty(name: str) -> pl.DataFrame:
@@ -80,6 +85,8 @@ class PictureData:
                       angle β = atan2(-v, u), yaw rate [rad, rad/s], true wind
     band              half-width of the model's own 90 % band by time since the window's start [s]:
                       of the position [m] and of the heading [rad]; empty where it has none
+    acting            of each named cause with an onset, by stretches of recorded time [s] from the
+                      trial's start: the probability that it acts
     """
 
     title: str
@@ -98,6 +105,7 @@ class PictureData:
     residual: pl.DataFrame = field(default_factory=partial(empty, "residual"))
     conditions: pl.DataFrame = field(default_factory=partial(empty, "conditions"))
     band: pl.DataFrame = field(default_factory=partial(empty, "band"))
+    acting: pl.DataFrame = field(default_factory=partial(empty, "acting"))
 
     def of(self, voyage: str) -> PictureData:
         """The same with the rows of one voyage; conditions and band are of them all."""
@@ -133,7 +141,11 @@ def load(folder: Path) -> PictureData:
     """What `save` wrote. Raises ShiplogError where something of it is missing or spoilt."""
     try:
         facts = json.loads((folder / FACTS).read_text(encoding="utf-8"))
-        tables = {name: pl.read_parquet(folder / f"{name}.parquet") for name in SCHEMAS}
+        tables = {
+            name: pl.read_parquet(folder / f"{name}.parquet") for name in SCHEMAS
+            if name not in LATER or (folder / f"{name}.parquet").exists()
+        }  # fmt: skip
+        tables = {name: tables.get(name, empty(name)) for name in SCHEMAS}
         for name, schema in SCHEMAS.items():
             tables[name] = tables[name].select(pl.col(k).cast(v) for k, v in schema.items())
         return PictureData(

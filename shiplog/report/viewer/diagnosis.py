@@ -26,6 +26,7 @@ AXIS_OF_CHANNEL = dict(zip((c.name for c in channels.VELOCITY), forces.FORCE_AXE
 DRAWABLE = str.maketrans({  # Rerun's fonts lack these, and its headless viewer falls over them
     "ᵀ": "'", "ᵢ": "_i", "⁻": "^-", "₊": "_+", "₋": "_-", "∇": "grad ",
 })  # fmt: skip
+ACTING_COLOURS = (colours.NAMED_FORCE, colours.BLUE, colours.GREEN, colours.PURPLE)
 CUT_OFF = 4.0  # times the middle error before: where the axis of errors ends at the latest
 
 
@@ -151,6 +152,8 @@ def _tab(picture: Pictured, voyage: str) -> rrb.Container:
         right += [_force(picture, voyage, axis) for axis in forces.FORCE_AXES]
     if (picture.errors["voyage"] == voyage).any():
         right += [_positions(picture, voyage), _errors(picture, voyage)]
+    if (picture.exhibit.acting["voyage"] == voyage).any():
+        right.append(_since_when(picture, voyage))
     if not right:  # too short for either
         return rrb.Vertical(left, name=voyage)
     return rrb.Horizontal(left, rrb.Vertical(*right), column_shares=[1.0, 1.45], name=voyage)
@@ -212,6 +215,17 @@ def _errors(picture: Pictured, voyage: str) -> rrb.View:
     )
 
 
+def _since_when(picture: Pictured, voyage: str) -> rrb.View:
+    return rrb.TimeSeriesView(
+        origin=entity("acting", voyage),
+        name="probability that each named cause acts",
+        axis_x=_whole_voyage(picture, voyage),
+        axis_y=rrb.ScalarAxis(range=(-0.04, 1.08)),
+        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop),
+        background=style.plot_background(),
+    )
+
+
 def _whole_voyage(picture: Pictured, voyage: str) -> rrb.TimeAxis:
     measured = picture.tracks.measured.filter(pl.col("voyage") == voyage)
     return timeline.whole_voyage(measured, after=0.24)
@@ -235,6 +249,7 @@ def send(recording: rr.RecordingStream, picture: Pictured) -> None:
         _send_forces(recording, picture, voyage)
         _send_positions(recording, picture, voyage)
         _send_errors(recording, picture, voyage)
+        _send_acting(recording, picture, voyage)
     text = picture.exhibit.report.translate(DRAWABLE)
     recording.log(
         "/report", rr.TextDocument(inert(text), media_type=rr.MediaType.MARKDOWN), static=True
@@ -298,3 +313,15 @@ def _send_errors(recording: rr.RecordingStream, picture: Pictured, voyage: str) 
                 recording, entity("errors", voyage, model), time, values[:, None],
                 np.arange(2, len(time), 2), [model], of[model], 3.0,
             )  # fmt: skip
+
+
+def _send_acting(recording: rr.RecordingStream, picture: Pictured, voyage: str) -> None:
+    """A line a named cause."""
+    rows = picture.exhibit.acting.filter(pl.col("voyage") == voyage)
+    for number, cause in enumerate(rows["cause"].unique(maintain_order=True)):
+        own = rows.filter(pl.col("cause") == cause)
+        timeline.send_lines(
+            recording, entity("acting", voyage, cause), display.column(own, "time"),
+            display.column(own, "probability")[:, None], np.empty(0, dtype=np.intp),
+            [_spoken((cause,))], ACTING_COLOURS[number % len(ACTING_COLOURS)], 2.0,
+        )  # fmt: skip

@@ -18,6 +18,9 @@ TRACKS = {
     "model": pl.String, "voyage": pl.String, "window": pl.Int64, "time": pl.Float64,
     **{channel.name: pl.Float64 for channel in STATE},
 }  # fmt: skip
+ACTING = {
+    "cause": pl.String, "voyage": pl.String, "time": pl.Float64, "probability": pl.Float64,
+}  # fmt: skip
 ERROR_COLUMNS = {
     "voyage": pl.String, "window": pl.Int64, "time": pl.Float64, "seconds": pl.Float64,
     BEFORE: pl.Float64, AFTER: pl.Float64,
@@ -41,6 +44,8 @@ class Exhibit:
                model diverges and the window is in none of the figures
     report     Markdown
     run        the name of the model's run, by which it has its colour
+    acting     cause, voyage, time, probability: that each named cause acts, a row a stretch at its
+               begin and one at its end
     banks, ship_outline, datums, current, made_fast   as a comparison has them
     """
 
@@ -60,6 +65,7 @@ class Exhibit:
     datums: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     current: Current | None = None
     made_fast: MadeFast | None = None
+    acting: pl.DataFrame = field(default_factory=lambda: pl.DataFrame(schema=ACTING))
 
     @property
     def voyages(self) -> list[str]:

@@ -7,10 +7,17 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from shiplog.diagnosis.hypotheses.hypothesis import name_of
+from shiplog.diagnosis.onset.onsets import Course
 from shiplog.diagnosis.residual.next_manoeuvre import Advice
+from shiplog.diagnosis.season.trends import OfVoyage
 from shiplog.diagnosis.verdict.result import SIDE_THRUST, Decision, Named
 from shiplog.exceptions import listed
+from shiplog.models.causes import ParameterEstimate
 from shiplog.nomenclature.numbers import NINETY_SPREADS, figure
+from shiplog.report.diagnosis.sections import onset as onsets
+from shiplog.report.diagnosis.sections import season
+from shiplog.report.diagnosis.sections.onset import Dated, Off, Onset, Slope
+from shiplog.report.diagnosis.sections.season import InVoyage
 from shiplog.report.evaluation.text_table import table
 
 # Of what it is: the part of a cause's label after the colon, by one or two words
@@ -80,6 +87,14 @@ class NamedCause:
     next_test_expected      of the simulated manoeuvres the best, with `manoeuvre`, `seconds`,
                             `nats`
     user                    true of a cause of your own
+    onset                   since when it acts: `elapsed_s`, `low`, `high`, `from_start`, `voyage`,
+                            `start_s`
+    off                     until when, where it ends: the same with `probability`
+    slope                   of a cause that grows, instead: `parameter`, `value`, `low`, `high`,
+                            `unit`, `days`
+    while_on                `parameters` while it acts, where that is not all the time
+    voyages                 of two voyages or more: `voyage`, `date`, `parameters` and, of what
+                            wears, `calm_speed_change` (%), by partial pooling
     """
 
     name: str
@@ -94,12 +109,21 @@ class NamedCause:
     next_test: str | None = None
     next_test_expected: NextTest | None = None
     user: bool | None = None
+    onset: Onset | None = None
+    off: Off | None = None
+    slope: Slope | None = None
+    while_on: Mapping[str, Estimate] | None = None
+    voyages: tuple[InVoyage, ...] | None = None
 
 
-def of_named(named: Named, advice: Advice | None = None) -> NamedCause:
+def of_named(
+    named: Named, advice: Advice | None = None, course: Course | None = None,
+    voyages: Sequence[OfVoyage] = (),
+) -> NamedCause:  # fmt: skip
     alike = tuple(dict.fromkeys(name_of(label) for label in named.alike))
     tests = [named.cause.separated_by[n] for n in alike if n in named.cause.separated_by]
     advised = advice.words if advice else UNADVISED
+    dated = onsets.of(course)
     return NamedCause(
         name=named.cause.name,
         probability=min(max(named.probability, 0.0), 1.0),
@@ -112,15 +136,23 @@ def of_named(named: Named, advice: Advice | None = None) -> NamedCause:
         next_test=("; ".join(dict.fromkeys(tests)) or advised) if alike else None,
         next_test_expected=advice and NextTest(advice.words, advice.seconds, advice.nats),
         user=named.cause.user or None,
+        onset=dated.onset,
+        off=dated.off,
+        slope=dated.slope,
+        while_on=_estimates(dated.while_on),
+        voyages=season.of(voyages),
     )
+
+
+def _estimates(found: Mapping[str, ParameterEstimate] | None) -> dict[str, Estimate] | None:
+    if found is None:
+        return None
+    return {k: Estimate(one.value, one.low, one.high, one.unit) for k, one in found.items()}
 
 
 def parameters(named: Named) -> dict[str, Estimate]:
     """The contract's parameters, and of which channel or actuator they are."""
-    sizes = {
-        key: Estimate(one.value, one.low, one.high, one.unit)
-        for key, one in named.estimates.items()
-    }
+    sizes = _estimates(named.estimates) or {}
     words = {key: getattr(named.cause, key, "") for key in WHICH}
     return sizes | {key: Estimate(one, one, one, "") for key, one in words.items() if one}
 
@@ -170,6 +202,9 @@ def _lines(cause: NamedCause) -> list[str]:
         cause.sentence, "", f"    {cause.equation}", "",
         table(("parameter", "value", "90 % interval", "unit"), rows, ("value",)),
     ]  # fmt: skip
+    for line in onsets.lines(Dated(cause.onset, cause.off, cause.slope, cause.while_on)):
+        lines += ["", line]
+    lines += season.lines(cause.voyages)
     if cause.indistinguishable_from:
         lines += [
             "", f"These data cannot tell it from {listed(cause.indistinguishable_from)}. "

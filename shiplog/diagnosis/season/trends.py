@@ -1,0 +1,355 @@
+"""Each cause of a hypothesis voyage by voyage: sizes, slope, events, the date of a limit."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+
+from shiplog.diagnosis.onset import stretch_information
+from shiplog.diagnosis.onset.drift import DAY_S, Slope
+from shiplog.diagnosis.onset.onsets import Course
+from shiplog.diagnosis.onset.stretch_information import Stretches
+from shiplog.diagnosis.season import limit, pooling, speed_loss, voyage_sizes
+from shiplog.diagnosis.season.pooling import Pooled, Voyages
+from shiplog.diagnosis.trial.fitted import Fit
+from shiplog.diagnosis.trial.trial import Trial
+from shiplog.diagnosis.verdict.result import Named
+from shiplog.exceptions import ShiplogError, UsageError, listed
+from shiplog.models.causes import Cause, ParameterEstimate, si
+
+TAIL = (0.05, 0.95)
+MOST_VOYAGES = 60  # of a verdict's view of its season
+WEARS = "ship"  # kind of causes that wear along a season: hull, screws, rudders
+BULK = (0.005, 0.995)  # of the draws: the calm speed of those beyond is that of the end
+CALM_GRID = 13  # sizes at which the model's calm speed is worked out; straight in between
+
+
+@dataclass(frozen=True)
+class OfVoyage:
+    """A cause in one voyage: name of a parameter → its size.
+
+    date       middle of the voyage; None where its recorder knows no date
+    pooled     by partial pooling; `alone` without: each voyage has a size of its own
+    speed      change of the calm speed at equal revolutions that the pooled size makes, %; None of
+               causes that change none
+    """
+
+    voyage: str
+    date: datetime | None
+    pooled: Mapping[str, ParameterEstimate]
+    alone: Mapping[str, ParameterEstimate]
+    speed: ParameterEstimate | None
+
+
+@dataclass(frozen=True)
+class Event:
+    """What a docking changed: levels before and after it, at its date, and their difference."""
+
+    date: datetime
+    before: Mapping[str, ParameterEstimate]
+    after: Mapping[str, ParameterEstimate]
+    change: Mapping[str, ParameterEstimate]
+
+
+@dataclass(frozen=True)
+class Limit:
+    """When the trend passes a limit of the user's, with its 90 % interval.
+
+    low, value, high   None where it does not within ten years
+    passed             probability that it has at the last voyage already
+    ever               probability that it does within ten years
+    """
+
+    parameter: str
+    limit: float
+    unit: str
+    low: datetime | None
+    value: datetime | None
+    high: datetime | None
+    passed: float
+    ever: float
+
+
+@dataclass(frozen=True)
+class Trend:
+    """One cause over a season.
+
+    spread   τ: standard deviation from voyage to voyage, share of the cause's realistic size; None
+             of one voyage
+    slope    of causes that wear, where there are three dated voyages or more
+    """
+
+    label: str
+    cause: Cause
+    voyages: tuple[OfVoyage, ...]
+    spread: ParameterEstimate | None
+    slope: Slope | None
+    events: tuple[Event, ...]
+    limit: Limit | None
+
+
+def of_fit(
+    trial: Trial, fit: Fit, labels: Sequence[str], starts: Mapping[str, datetime],
+    events: Sequence[datetime] = (), limits: Mapping[str, float] | None = None,
+) -> tuple[Trend, ...]:  # fmt: skip
+    """Of the causes `labels` of a hypothesis that holds them all.
+
+    starts   when each voyage began; without those whose recorder knows no date
+    events   dates at which every cause may have changed, such as dockings
+    limits   label → limit of the first parameter, in its unit
+
+    Raises ShiplogError where the model diverges.
+    """
+    by = {c.label: c for c in trial.reference.model.causes}
+    try:
+        return tuple(
+            _Season.of(
+                trial, stretch_information.of_cause(trial, fit, label), by[label], starts, events
+            ).trend((limits or {}).get(label))
+            for label in labels
+        )
+    except np.linalg.LinAlgError as error:
+        raise ShiplogError(
+            "The causes could not be followed: the model diverges on these voyages.",
+            hint="see what `shiplog diagnose` says of them.",
+        ) from error
+
+
+def of_courses(
+    trial: Trial, named: Sequence[Named], courses: Mapping[str, Course],
+    starts: Mapping[str, datetime],
+) -> dict[str, tuple[OfVoyage, ...]]:  # fmt: skip
+    """Label → each named cause of a verdict in each voyage; none of one voyage alone, or of very
+    many, of which `shiplog trend` has them."""
+    found: dict[str, tuple[OfVoyage, ...]] = {}
+    if not 2 <= len(trial.record.names) <= MOST_VOYAGES:
+        return found
+    for one in named:
+        course = courses.get(one.cause.label)
+        if course is None or course.told is None:
+            continue
+        with contextlib.suppress(np.linalg.LinAlgError):  # of a model that hardly is this ship's
+            season = _Season.of(trial, course.told, one.cause, starts)
+            found[one.cause.label] = season.voyages()
+    return found
+
+
+@dataclass(frozen=True)
+class _Season:
+    """One cause with its draws; `first` is the date of day 0, None without dates."""
+
+    trial: Trial
+    cause: Cause
+    unit: np.ndarray
+    of_voyages: Voyages
+    names: tuple[str, ...]
+    pooled: Pooled
+    first: datetime | None
+    events: tuple[datetime, ...]
+
+    @classmethod
+    def of(
+        cls, trial: Trial, told: Stretches, cause: Cause, starts: Mapping[str, datetime],
+        events: Sequence[datetime] = (),
+    ) -> _Season:  # fmt: skip
+        likelihood, names = voyage_sizes.by_voyage(trial, told, starts, events)
+        dated = set(trial.record.names) <= set(starts)
+        wears = cause.kind == WEARS and dated
+        pooled = pooling.pool(likelihood, wears, trial.reference.freedom)
+        first = min(starts[n] for n in trial.record.names) if dated else None
+        return cls(trial, cause, told.unit, likelihood, names, pooled, first,
+                   tuple(sorted(events)) if dated else ())  # fmt: skip
+
+    def voyages(self) -> tuple[OfVoyage, ...]:
+        """The cause in each of them."""
+        speed = self._speed_of()
+        return tuple(
+            OfVoyage(
+                name, self._date(float(self.of_voyages.days[v])),
+                self._estimates(self.pooled.sizes[:, v]), self._estimates(self.pooled.alone[:, v]),
+                None if speed is None else _summary(speed(self.pooled.sizes[:, v, 0]), "%"),
+            )
+            for v, name in enumerate(self.names)
+        )  # fmt: skip
+
+    def trend(self, limit_at: float | None) -> Trend:
+        voyages = self.voyages()
+        spread = _summary(self.pooled.spread, "1") if len(voyages) > 1 else None
+        return Trend(
+            self.cause.label, self.cause, voyages, spread, self._slope(), self._events(),
+            self._limit(limit_at),
+        )  # fmt: skip
+
+    def _date(self, days: float | None) -> datetime | None:
+        if self.first is None or days is None:
+            return None
+        return self.first + timedelta(seconds=days * DAY_S)
+
+    def _estimates(self, draws: np.ndarray) -> dict[str, ParameterEstimate]:
+        """The contract's parameters of draws [D, q], in units."""
+        numbers = draws * self.unit
+        middle = self.cause.displayed(numbers.mean(0))
+        found = {}
+        for name, (values, unit) in self.cause.displayed(numbers).items():
+            spread = values - middle[name][0]
+            if unit == "deg":
+                spread = (spread + 180.0) % 360.0 - 180.0
+            low, high = np.quantile(spread, TAIL)
+            value = float(middle[name][0])
+            found[name] = ParameterEstimate(
+                value, value + min(float(low), 0.0), value + max(float(high), 0.0), unit
+            )
+        return found
+
+    def _slope(self) -> Slope | None:
+        """β in a day, of the first parameter."""
+        if not self.pooled.slope.any():
+            return None
+        of = self.cause.parameters[0]
+        days = self.of_voyages.span
+        per_day = self.pooled.slope[:, 0] * self.unit[0] / si(of.unit) / days
+        unit = "1/day" if of.unit == "1" else f"{of.unit}/day"
+        one = _summary(per_day, unit)
+        return Slope(of.name, one.value, one.low, one.high, one.unit, days)
+
+    def _events(self) -> tuple[Event, ...]:
+        """Between each two levels, at the last event between them."""
+        found = []
+        days, level = self.of_voyages.days, self.of_voyages.level
+        for after in range(1, int(level.max()) + 1):
+            begin, end = days[level == after - 1].max(), days[level == after].min()
+            at = [one for one in self.events if begin <= self._days(one) <= end]
+            if not at:
+                continue
+            t = (self._days(at[-1]) - self.of_voyages.middle) / max(self.of_voyages.span, 1e-12)
+            one, other = (
+                self.pooled.levels[:, g] + t * self.pooled.slope for g in (after - 1, after)
+            )
+            found.append(Event(
+                at[-1], self._estimates(one), self._estimates(other), self._change(other - one)
+            ))  # fmt: skip
+        return tuple(found)
+
+    def _change(self, difference: np.ndarray) -> dict[str, ParameterEstimate]:
+        """Of the numbers themselves: a difference of directions or factors is one of numbers."""
+        return {
+            p.name: _summary(difference[:, i] * self.unit[i] / si(p.unit), p.unit)
+            for i, p in enumerate(self.cause.parameters)
+        }
+
+    def _days(self, date: datetime) -> float:
+        assert self.first is not None
+        return (date.timestamp() - self.first.timestamp()) / DAY_S
+
+    def _limit(self, at: float | None) -> Limit | None:
+        if at is None:
+            return None
+        parameter = refuse_limit(self.cause)
+        if not self.pooled.slope.any():
+            raise UsageError(
+                f"A limit of {self.cause.label} needs a trend: three voyages or more with dates, "
+                f"and there are {len(self.names)}.",
+                hint="give more voyages, or leave --limit out.",
+            )
+        absent, one = (float(self.cause.displayed(np.array([n]))[parameter][0]) for n in (0.0, 1.0))
+        x = (at - absent) / (one - absent) / self.unit[0]
+        found = limit.passing(self.of_voyages, self.pooled, float(x))
+        unit = self.cause.displayed(np.zeros(1))[parameter][1]
+        return Limit(
+            parameter, at, unit, self._date(found.low), self._date(found.value),
+            self._date(found.high), found.passed, found.ever,
+        )  # fmt: skip
+
+    def _speed_of(self):
+        """Size → change of the calm speed ahead at equal revolutions [%]; None where it has none.
+
+        100 (V(x)/V(0) - 1), V the model's steady speed at the trial's mean revolutions
+        """
+        if self.cause.kind != WEARS or self.cause.count != 1 or self.cause.over_trial:
+            return None
+        sizes = self.pooled.sizes[..., 0]
+        low, high = np.quantile(sizes, BULK)
+        grid = np.linspace(min(float(low), -0.01), max(float(high), 0.01), CALM_GRID)
+        grid = np.unique(np.append(grid, 0.0))
+        calm = calm_speeds(self.trial, self.cause, grid * self.unit[0])
+        still = calm[grid == 0.0][0]
+        if not np.isfinite(calm).all() or abs(np.ptp(calm)) < 1e-6 * still:
+            return None
+        change = 100.0 * (calm / still - 1.0)
+        return lambda x: np.interp(x, grid, change)
+
+
+def refuse_limit(cause: Cause) -> str:
+    """Its parameter that can have a limit. Raises UsageError for a cause without one."""
+    shown = list(cause.displayed(np.zeros(cause.count)))
+    if cause.count == 1 and len(shown) == 1 and cause.kind == WEARS:
+        return shown[0]
+    raise UsageError(
+        f"{cause.label} can have no limit: it has {listed(shown)}, and does not wear along a "
+        "season.",
+        hint="give --limit of a cause of the ship with one number, such as thrust_loss=0.9.",
+    )
+
+
+def nominal_theta(trial: Trial) -> np.ndarray:
+    """θ [C] as the nominal campaign has it, without any change by a cause."""
+    ref = trial.reference
+    theta = np.concatenate((ref.theta, np.zeros(ref.columns.linearised - ref.columns.base)))
+    return theta + (ref.mean * ref.columns.unit)[: len(theta)]
+
+
+def calm_speeds(trial: Trial, cause: Cause, numbers: np.ndarray) -> np.ndarray:
+    """V(x) [n] of numbers x [n], SI: steady speed ahead without wind, every actuator that turns at
+    its mean over the trial while it turns ahead, every angle at zero."""
+    record = trial.record
+    mean = np.zeros(record.actuator.shape[1])
+    for i, a in enumerate(record.profile.actuators):
+        ahead = record.actuator[:, i][record.actuator[:, i] > 0.0]
+        if a.kind in ("propeller", "thruster") and len(ahead):
+            mean[i] = float(ahead.mean())
+    speed = float(np.hypot(record.state[:, 1], record.state[:, 3]).max())
+    driven = np.array([[*mean, 0.5, 0.0, 0.0]])
+    found = []
+    column = trial.reference.columns.indices[cause.label][0]
+    for x in numbers:
+        theta = nominal_theta(trial)
+        theta[column] += x
+        found.append(
+            speed_loss.expected_speed(trial, theta, np.array([speed]), np.zeros(1), driven)[0]
+        )
+    return np.array(found)
+
+
+def _summary(draws: np.ndarray, unit: str) -> ParameterEstimate:
+    low, high = np.quantile(draws, TAIL)
+    return ParameterEstimate(float(draws.mean()), float(low), float(high), unit)
+
+
+def parse_date(text: str) -> datetime:
+    """An ISO 8601 date, UTC unless it says otherwise. Raises UsageError."""
+    try:
+        found = datetime.fromisoformat(text)
+    except ValueError:
+        raise UsageError(
+            f"{text!r} is no date.", hint="give it as 2026-05-17, or 2026-05-17T08:00."
+        ) from None
+    return found if found.tzinfo else found.replace(tzinfo=UTC)
+
+
+def parse_limit(text: str) -> tuple[str, float]:
+    """`thrust_loss=0.9` as cause and value. Raises UsageError."""
+    label, _, value = text.partition("=")
+    try:
+        number = float(value)
+    except ValueError:
+        number = math.nan
+    if not label or not math.isfinite(number):
+        raise UsageError(
+            f"{text!r} is no limit.", hint="give a cause and a number, such as thrust_loss=0.9."
+        )
+    return label, number

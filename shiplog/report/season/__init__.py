@@ -1,0 +1,1 @@
+"""A season: text, JSON, page and picture."""
