@@ -1,9 +1,9 @@
 """The quantities of a manoeuvre, and how sure a measurement of them is.
 
 The interval is that of what was recorded: the noise of each instrument (`sensor_noise`), when the
-order was given (to half a sample), and the current that was taken out. Each is drawn, the quantities
-are worked out again, and the interval is the value ± 1.645 standard deviations. What a wind or a sea
-did to the ship is not in it: that is a condition.
+order was given (to half a sample), and the current that was taken out. Each is drawn, the
+quantities are worked out again, and the interval is the value ± 1.645 standard deviations. What a
+wind or a sea did to the ship is not in it: that is a condition.
 """
 
 from __future__ import annotations

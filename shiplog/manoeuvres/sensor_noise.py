@@ -41,11 +41,12 @@ class Noise:
 
     def drawn(self, track: Track, rng: np.random.Generator) -> Track:
         """The track, disturbed once more by the same instruments."""
-        count, step = len(track), np.diff(track.time, prepend=track.time[0])
-        keep = np.exp(-step / SLOW_TIME)
-        white, slow, new = rng.standard_normal((3, count, 6))
-        for k in range(1, count):
-            slow[k] = keep[k] * slow[k - 1] + math.sqrt(1.0 - keep[k] ** 2) * new[k]
+        from scipy.signal import lfilter
+
+        white, new = rng.standard_normal((2, len(track), 6))
+        keep = math.exp(-_step(track) / SLOW_TIME)
+        first = keep * rng.standard_normal((1, 6))  # g_{-1}, drawn from where it settles
+        slow, _ = lfilter([math.sqrt(1.0 - keep**2)], [1.0, -keep], new, axis=0, zi=first)
         error = math.sqrt(1.0 - SLOW_SHARE) * white + math.sqrt(SLOW_SHARE) * slow
         return replace(track, state=track.state + self.sigma * error)
 
@@ -66,6 +67,10 @@ def of_profile(profile: Profile, track: Track) -> Noise:
     )  # fmt: skip
 
 
+def _step(track: Track) -> float:
+    return float(np.median(np.diff(track.time)))
+
+
 def _white(values: np.ndarray) -> float:
     """σ of a record whose white part is that of its second differences."""
     if len(values) < 3:
@@ -78,7 +83,7 @@ def smoothed(track: Track, begin: float) -> Track:
     """Its state by local cubics; as it is where 0.3 L/V are too few samples for one."""
     from scipy.signal import savgol_filter
 
-    step = float(np.median(np.diff(track.time)))
+    step = _step(track)
     speed = max(float(track.speed[track.row(begin)]), 1e-6)
     samples = 2 * int(0.5 * SMOOTHED * track.length / speed / step) + 1
     samples = min(samples, len(track) - 1 + len(track) % 2)

@@ -14,6 +14,8 @@ COLUMNS = ("measured", "simulated", "extended")
 RELATIVE = ("advance", "transfer", "tactical_diameter", "steady_diameter", "initial_turning",
             "check_time", "period")  # fmt: skip
 UNITS = {"speed_loss": "", "drift_angle": " deg"}
+NAMED = (*RELATIVE, "drift_angle", "speed_loss", "first_overshoot", "second_overshoot",
+         "third_overshoot")  # fmt: skip
 
 
 def quantities(ships: Sequence[dict[str, Any]]) -> pl.DataFrame:
@@ -49,6 +51,23 @@ def missing(ships: Sequence[dict[str, Any]]) -> dict[str, int]:
     """How many quantities that the ships had are without an interval of each kind."""
     rows = [row for ship in ships for row in ship["quantities"]]
     return {what: sum(row.get(what) is None for row in rows) for what in COLUMNS[:2]}
+
+
+def worst_first(frame: pl.DataFrame) -> pl.DataFrame:
+    """Rows of the quantity that is least often inside first."""
+    return frame.with_columns(pl.col("inside").mean().over("quantity").alias("often")).sort(
+        "often", "quantity", maintain_order=True
+    )
+
+
+def extended_pairs(frame: pl.DataFrame) -> str | None:
+    """Simulated and extended where there are both; None where there is no such ship."""
+    keys = ["ship", "trial", "quantity"]
+    both = frame.filter(pl.col("what") == "extended").select(keys)
+    if both.is_empty():
+        return None
+    paired = frame.filter(pl.col("what") != "measured").join(both, on=keys, how="semi")
+    return by(paired, "changed", "what") + "\n\n" + by(paired, "what")
 
 
 def share(inside: int, count: int) -> str:

@@ -17,8 +17,8 @@ from pipelines.experiments.other_families.effects import Effects
 from pipelines.experiments.other_families.ship import Ship
 from pipelines.experiments.other_families.voyage import Voyage, sail
 
-APPROACH = 14.0  # L/U of a straight course before the first order
-LONGEST = {"turn": 60.0, "zigzag": 60.0}  # L/U after it, at most
+APPROACH = 10.0  # L/U of a straight course before the first order
+LONGEST = {"turn": 50.0, "zigzag": 45.0}  # L/U after it, at most
 AFTER = 0.5  # L/U of the record beyond the end
 CIRCLES = math.radians(560.0)  # heading change of a turn: a circle and a half, and a little
 REVERSALS = 4  # of a zigzag: the peaks of three overshoots and a period
@@ -81,7 +81,7 @@ class Helm:
 
 
 def drawn(rng: np.random.Generator) -> tuple[Trial, ...]:
-    """A turn to either side with 35 deg, one with 20, and two zigzags."""
+    """A turn with 35 deg of rudder to either side, and zigzags 10/10 and 20/20."""
     side = float(rng.choice((-1.0, 1.0)))
     power = float(rng.choice((0.6, 0.8)))
     deg = math.radians
@@ -94,9 +94,7 @@ def drawn(rng: np.random.Generator) -> tuple[Trial, ...]:
         name = f"zigzag_{abs(degrees):.0f}"
         return Trial(name, "zigzag", deg(degrees), deg(abs(degrees)), power)
 
-    return (
-        turn(35.0), turn(-35.0), turn(20.0 * side), zigzag(10.0 * side), zigzag(-20.0 * side),
-    )  # fmt: skip
+    return turn(35.0 * side), zigzag(10.0 * side), zigzag(-20.0 * side)
 
 
 @dataclass(frozen=True)
