@@ -6,7 +6,7 @@
 Ships are numbered from --first. Numbers from 1000 on are for development: a change of the intervals
 is tried there, and reported on the ships from 0. Each ship has a folder, and one that has its
 `ship.json` is not done again: the same command goes on where it was stopped. --report writes
-the tables of what is there. Every tenth ship changes before its trials, and a diagnosis extends its
+the tables of what is there. Every ninth ship changes before its trials, and a diagnosis extends its
 model. 10 to 40 s of CPU a ship. The family shipmmg needs the extra `experiments`.
 """
 
@@ -16,27 +16,12 @@ import argparse
 import concurrent.futures
 import json
 import multiprocessing
-import time
-import traceback
 from pathlib import Path
 
 from pipelines.experiments.manoeuvre_coverage import page
-from pipelines.experiments.manoeuvre_coverage.one_ship import RESULT, one_ship
+from pipelines.experiments.manoeuvre_coverage.one_ship import RESULT, done
 
-EXTENDED = 10  # every tenth
-FAILED = "failed.txt"
-
-
-def done(number: int, out: Path, extended: bool, keep: bool, judge: bool) -> str:
-    """One ship; a failure is kept in its folder, and the others go on."""
-    folder, began = out / f"ship_{number}", time.process_time()
-    try:
-        one_ship(number, folder, extended=extended, keep=keep, judge=judge)
-    except Exception:
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / FAILED).write_text(traceback.format_exc(), encoding="utf-8")
-        return f"ship {number}: failed, see {folder / FAILED}"
-    return f"ship {number}: {time.process_time() - began:.0f} s of CPU"
+EXTENDED = 9  # every ninth: of every family
 
 
 def main() -> None:

@@ -7,6 +7,8 @@ have other forms than the model's; it is recorded by instruments with noise and 
 from __future__ import annotations
 
 import json
+import time
+import traceback
 from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
@@ -32,6 +34,7 @@ CHANGES = ("current", "fouling", "thrust_loss", "rudder_force")
 CHANGED_CAMPAIGN = 50.0  # L/U after the change, that a diagnosis has
 RESULT, TRUTH, PROFILE = "ship.json", "truth.json", "ship.toml"
 MODELS = ("simulated", "extended")
+FAILED = "failed.txt"
 
 
 def campaign_seconds(ship: Ship, units: float) -> float:
@@ -76,6 +79,18 @@ def one_ship(
         for part in ("store", "diagnosis", "run", "extended"):
             files.remove(folder / part)
     return found
+
+
+def done(number: int, out: Path, extended: bool, keep: bool, judge: bool) -> str:
+    """One ship; a failure is kept in its folder, and the others go on."""
+    folder, began = out / f"ship_{number}", time.process_time()
+    try:
+        one_ship(number, folder, extended=extended, keep=keep, judge=judge)
+    except Exception:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / FAILED).write_text(traceback.format_exc(), encoding="utf-8")
+        return f"ship {number}: failed, see {folder / FAILED}"
+    return f"ship {number}: {time.process_time() - began:.0f} s of CPU"
 
 
 def _case(number: int, extended: bool) -> cases.Case:
