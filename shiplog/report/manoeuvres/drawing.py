@@ -34,8 +34,7 @@ def picture(entry: Entry, name: str) -> Picture | None:
         if on_path
         else "Heading against that of the approach, and the rudder."
     )
-    title = head(entry)
-    return Picture(svg, f"{title}. {words}", title)
+    return Picture(svg, words, head(entry))
 
 
 def draw(axes: Axes, entry: Entry) -> None:
