@@ -86,12 +86,9 @@ def test_white_noise_is_read_off_the_record_of_a_velocity_without_a_stated_accur
     state = np.zeros((len(time), 6))
     state[:, 1] = SPEED + 0.3 * np.sin(time / 20.0) + 0.04 * rng.standard_normal(len(time))
     track = Track(time, state, np.zeros(len(time)), np.ones(len(time)), LENGTH)
-    bare = PROFILE.model_copy(
-        update={
-            "sensors": PROFILE.sensors.model_copy(
-                update={"velocity": PROFILE.sensors.velocity.model_copy(update={"sigma": None})}
-            )
-        }
-    )
+    velocity = PROFILE.sensors.velocity
+    assert velocity is not None
+    silent = {"velocity": velocity.model_copy(update={"sigma": None})}
+    bare = PROFILE.model_copy(update={"sensors": PROFILE.sensors.model_copy(update=silent)})
     sigma = sensor_noise.of_profile(bare, track).sigma
     assert math.sqrt(0.5) * sigma[1] == pytest.approx(0.04, rel=0.05)
