@@ -19,7 +19,7 @@ import multiprocessing
 from pathlib import Path
 
 from pipelines.experiments.manoeuvre_coverage import page
-from pipelines.experiments.manoeuvre_coverage.one_ship import RESULT, done
+from pipelines.experiments.manoeuvre_coverage.one_ship import FAMILIES, RESULT, done, family_of
 
 EXTENDED = 9  # every ninth: of every family
 
@@ -32,12 +32,17 @@ def main() -> None:
     parser.add_argument("--ships", type=int, default=200)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--out", type=Path, default=Path("coverage"))
+    parser.add_argument("--family", choices=FAMILIES, help="only ships of this one")
     parser.add_argument("--extended", type=int, default=EXTENDED, help="every so many; 0 is none")
     parser.add_argument("--keep", action="store_true", help="stores and runs as well")
     parser.add_argument("--prepare", action="store_true", help="sail and identify; judge later")
     parser.add_argument("--report", action="store_true", help="tables of what is there")
     given = parser.parse_args()
-    numbers = range(given.first, given.first + given.ships)
+    numbers = [
+        number
+        for number in range(given.first, given.first + given.ships)
+        if given.family in (None, family_of(number))
+    ]
     if not given.report:
         given.out.mkdir(parents=True, exist_ok=True)
         context = multiprocessing.get_context("spawn")

@@ -32,7 +32,7 @@ LEAST_CAMPAIGN = 2000.0  # s: 20 windows of 100 s
 MEMBERS = 200
 CHANGES = ("current", "fouling", "thrust_loss", "rudder_force")
 CHANGED_CAMPAIGN = 50.0  # L/U after the change, that a diagnosis has
-RESULT, TRUTH, PROFILE = "ship.json", "truth.json", "ship.toml"
+RESULT, TRUTH, CHANGED, PROFILE = "ship.json", "truth.json", "changed.json", "ship.toml"
 MODELS = ("simulated", "extended")
 FAILED = "failed.txt"
 
@@ -55,7 +55,7 @@ def one_ship(
     if kept.exists():
         return json.loads(kept.read_text("utf-8"))
     case = _case(number, extended)
-    truth = folder / TRUTH
+    truth = folder / (CHANGED if extended else TRUTH)  # other trials: nothing of them is kept
     if not truth.exists():
         files.remove(folder)
         (folder / "logs").mkdir(parents=True)
@@ -93,8 +93,12 @@ def done(number: int, out: Path, extended: bool, keep: bool, judge: bool) -> str
     return f"ship {number}: {time.process_time() - began:.0f} s of CPU"
 
 
+def family_of(number: int) -> str:
+    return FAMILIES[number % len(FAMILIES)]
+
+
 def _case(number: int, extended: bool) -> cases.Case:
-    family = FAMILIES[number % len(FAMILIES)]
+    family = family_of(number)
     drawn = cases.FAMILIES[family](number)
     cause = str(stream(number, "what changes").choice(CHANGES)) if extended else "none"
     return cases.draw(
