@@ -19,8 +19,8 @@ Nelder 1989 have it of counts):
     κ = max(1, L of held-out voyages/L fitted),   H' = H/κ,   C' = κ C (1 + (κ - 1) C)⁻¹
 
 with C in units of s, so that what was known before any data is not widened. Of the coefficients of
-simulated ships 63 to 81 % lay inside their 90 % intervals with κ = 1, and 79 to 89 % with it
-(docs/evidence/manoeuvres.md).
+simulated ships of development 63 to 81 % lay inside their 90 % intervals with κ = 1, and 79 to
+89 % with it; of others 67 to 71 % (docs/evidence/manoeuvres.md).
 
 Spread from voyage to voyage is the τ of a random effect (DerSimonian & Laird 1986). Voyage v alone,
 with all other coefficients where they are, has the estimate and weight
