@@ -60,7 +60,7 @@ def simulate(
     speed: Annotated[
         float | None,
         typer.Option(
-            metavar="M/S", help="Of the approach, through the water; the usual one unless given."
+            metavar="M/S", help="Of the approach, through the water; the nominal one unless given."
         ),
     ] = None,
     wind: Annotated[

@@ -23,7 +23,7 @@ def by_the_book(
     scale: float,
     members: int,
 ) -> list[Entry]:
-    """The standard manoeuvres, in calm and still water, at the run's usual speed."""
+    """The standard manoeuvres, in calm and still water, at the run's nominal speed."""
     calm = [None if s is None else without_water(s) for s in sailors]
     speed = next((s.speed for s in calm if s is not None), 0.0)
     found = []

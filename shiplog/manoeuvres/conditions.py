@@ -81,11 +81,11 @@ def of(found: Found, record: Record, profile: Profile, coverage: float | None = 
 
 
 def why_not(
-    found: Found, conditions: Conditions, profile: Profile, usual: float, scale: float = 1.0
+    found: Found, conditions: Conditions, profile: Profile, nominal: float, scale: float = 1.0
 ) -> tuple[str, ...]:
     """Everything known that keeps it from being the standard's; nothing where it is.
 
-    usual   speed that stands for that of 85 % of the output: the fastest approach of the voyages
+    nominal   speed that stands for that of 85 % of the output: the fastest approach of the voyages
     scale   λ of a model: its wind is the ship's divided by √λ
     """
     reasons = [found.part] if found.part else []
@@ -97,7 +97,7 @@ def why_not(
         abs(degrees - a) <= off and abs(heading - b) <= 2.0 * off for a, b in ZIGZAGS
     ):
         reasons.append(f"it is a {degrees:.0f}/{heading:.0f}; the standard's are 10/10 and 20/20")
-    reasons += _approach(found, usual)
+    reasons += _approach(found, nominal)
     if conditions.wind is not None:
         wind = conditions.wind * math.sqrt(scale)
         if (number := beaufort(wind)) > MOST_BEAUFORT:
@@ -110,7 +110,7 @@ def why_not(
     return tuple(reasons)
 
 
-def _approach(found: Found, usual: float) -> list[str]:
+def _approach(found: Found, nominal: float) -> list[str]:
     before = found.approach
     if before is None:
         return ["the record does not show its approach"]
@@ -123,8 +123,9 @@ def _approach(found: Found, usual: float) -> list[str]:
         )
     if abs(before.gained) > STEADY_SPEED and found.kind not in ("pull_out", "spiral"):
         reasons.append(f"the speed changes by {before.gained:+.0%} in the approach")
-    if before.speed < TEST_SPEED * usual and found.kind not in ("pull_out", "spiral"):
+    if before.speed < TEST_SPEED * nominal and found.kind not in ("pull_out", "spiral"):
         reasons.append(
-            f"the approach is at {figure(before.speed)} m/s, less than 90 % of {figure(usual)} m/s"
+            f"the approach is at {figure(before.speed)} m/s, less than 90 % of "
+            f"{figure(nominal)} m/s"
         )
     return reasons

@@ -1,31 +1,29 @@
 """The quantities of a manoeuvre, and how sure a measurement of them is.
 
-The interval is that of what was recorded: the noise of place and heading, when the order was given
-(to half a sample), and the current that was taken out. Each is drawn, the quantities are worked out
-again, and the interval is the value ± 1.645 standard deviations. What a wind or a sea did to the
-ship is not in it: that is a condition.
+The interval is that of what was recorded: the noise of each instrument (`sensor_noise`), when the
+order was given (to half a sample), and the current that was taken out. Each is drawn, the
+quantities are worked out again, and the interval is the value ± 1.645 standard deviations. What a
+wind or a sea did to the ship is not in it: that is a condition.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shiplog.manoeuvres import drift, steadiness, stopping, turning, zigzags
+from shiplog.manoeuvres import drift, sensor_noise, steadiness, stopping, turning, zigzags
 from shiplog.manoeuvres.drift import Drift
 from shiplog.manoeuvres.quantity import Estimate
 from shiplog.manoeuvres.recognition import Found
+from shiplog.manoeuvres.sensor_noise import Noise
 from shiplog.manoeuvres.track import Track
 from shiplog.nomenclature.numbers import NINETY_SPREADS
 from shiplog.ship_profile.profile import Profile
 
 DRAWS = 40  # their standard deviation is known to a ninth
-# Accuracy where the profile states none: a satellite receiver's, a compass's
-PLACE_SIGMA, HEADING_SIGMA = 1.0, math.radians(0.5)
-SMALLEST_SHARE = 0.02  # of L: a receiver's noise is not more than that on a ship it is meant for
+YAW_SHARE = 0.01  # of a spiral's settled yaw rates: how well the last seconds of a hold show them
 
 
 @dataclass(frozen=True)
@@ -69,14 +67,16 @@ def values(found: Found, track: Track) -> dict[str, float]:
 
 def measured(found: Found, profile: Profile, step: float) -> Measured:
     """Of a recorded manoeuvre. `step`: s between two rows."""
+    noise = sensor_noise.of_profile(profile, found.track)
+    raw = found
+    found = replace(found, track=sensor_noise.smoothed(found.track, found.begin))
     moved = drift.of_turn(found.track, found.begin, found.side) if found.kind == "turn" else None
     track = found.track.without(moved.velocity) if moved else found.track
     best = values(found, track)
     if not best:
         return Measured({}, moved)
-    noise = _noise(profile, track.length)
     rng = np.random.default_rng(0)
-    drawn = [values(*_disturbed(found, noise, moved, step, rng)) for _ in range(DRAWS)]
+    drawn = [values(*_disturbed(raw, noise, moved, step, rng)) for _ in range(DRAWS)]
     estimates = {}
     for name, value in best.items():
         many = np.array([one[name] for one in drawn if name in one])
@@ -86,34 +86,17 @@ def measured(found: Found, profile: Profile, step: float) -> Measured:
     return Measured(estimates, moved)
 
 
-def _noise(profile: Profile, length: float) -> tuple[float, float]:
-    """Of place [m] and heading [rad]."""
-    place = profile.sensors.noise("position") or min(PLACE_SIGMA, SMALLEST_SHARE * length)
-    return place, profile.sensors.noise("heading") or HEADING_SIGMA
-
-
 def _disturbed(
-    found: Found,
-    noise: tuple[float, float],
-    moved: Drift | None,
-    step: float,
-    rng: np.random.Generator,
+    found: Found, noise: Noise, moved: Drift | None, step: float, rng: np.random.Generator
 ) -> tuple[Found, Track]:
     """The manoeuvre as it may have been as well."""
-    place, heading = noise
-    track = found.track
+    track = noise.drawn(found.track, rng)
     if moved is not None:
         track = track.without(rng.multivariate_normal(moved.velocity, moved.covariance))
-    state = track.state.copy()
-    state[:, [0, 2]] += place * rng.standard_normal((len(track), 2))
-    # a compass errs alike for minutes, and its error is a turn of the whole plane but for ψ - ψ₀
-    state[:, 4] += heading * rng.standard_normal()
+    track = sensor_noise.smoothed(track, found.begin)
     late = step * rng.uniform(-0.5, 0.5, len(found.orders))
     orders = tuple(np.clip(np.add(found.orders, late), track.time[0], track.time[-1]).tolist())
     steps = tuple(
-        (angle, rate * (1.0 + 0.01 * rng.standard_normal())) for angle, rate in found.steps
+        (angle, rate * (1.0 + YAW_SHARE * rng.standard_normal())) for angle, rate in found.steps
     )
-    return (
-        replace(found, begin=orders[0], orders=orders, steps=steps),
-        replace(track, state=state),
-    )
+    return replace(found, begin=orders[0], orders=orders, steps=steps), track

@@ -28,8 +28,8 @@ MARGIN = 4.0  # L/V before the order that are kept: its approach
 STEADY_HOLD = 3.0  # L/V of a step of a spiral, or of a pull-out
 SPIRAL_STEP = math.radians(12.0)  # between two angles of a spiral
 SPIRAL_STEPS = 5  # of them, both sides among them
-MOVING = 0.25  # of the voyage's usual speed, below which nothing is a manoeuvre at speed
-AT_SPEED = 0.5  # of the usual speed, below which a stop is the end of one
+MOVING = 0.25  # of the voyage's nominal speed, below which nothing is a manoeuvre at speed
+AT_SPEED = 0.5  # of the nominal speed, below which a stop is the end of one
 MOST_GAIN = 0.5  # share by which the speed may change before a zigzag of one reversal
 STOPPED_SCREW = 0.05  # of the approach's revolutions
 LOST = 0.5  # of the speed, of a stop that is a part
@@ -113,17 +113,17 @@ def recognise(voyage: str, stretches: Sequence[Track]) -> list[Found]:
     ahead = speeds[speeds > 0.0]
     if not len(ahead):
         return []
-    usual = float(np.quantile(ahead, 0.9))
+    nominal = float(np.quantile(ahead, 0.9))
     found: list[Found] = []
     for track in stretches:
         if len(track) < 3:
             continue
-        found += _of_stretch(voyage, track, usual)
+        found += _of_stretch(voyage, track, nominal)
     return sorted(found, key=lambda one: one.begin)
 
 
-def _of_stretch(voyage: str, track: Track, usual: float) -> list[Found]:
-    length_time = track.length / usual
+def _of_stretch(voyage: str, track: Track, nominal: float) -> list[Found]:
+    length_time = track.length / nominal
     held = holds(track, length_time)
     found, taken = [], set()
     for first, last in _spirals(track, held, length_time):
@@ -135,19 +135,19 @@ def _of_stretch(voyage: str, track: Track, usual: float) -> list[Found]:
             at += 1
             continue
         chain = _chain(track, held, at, length_time)
-        made = _zigzag(voyage, track, held, chain, usual) if len(chain) > 1 else None
+        made = _zigzag(voyage, track, held, chain, nominal) if len(chain) > 1 else None
         if made is not None:
             found.append(made)
             taken |= set(chain)
             at = chain[-1] + 1
             continue
-        turn = _turn(voyage, track, held, at, usual)
+        turn = _turn(voyage, track, held, at, nominal)
         if turn is not None:
             found.append(turn)
             pulled = _pull_out(voyage, track, held, at, length_time)
             found += [pulled] if pulled is not None else []
         at += 1
-    return found + _stops(voyage, track, usual)
+    return found + _stops(voyage, track, nominal)
 
 
 # --- the approach ----------------------------------------------------------------------------
@@ -232,13 +232,13 @@ def _chain(track: Track, held: Sequence[Hold], at: int, length_time: float) -> l
 
 
 def _zigzag(
-    voyage: str, track: Track, held: Sequence[Hold], chain: list[int], usual: float
+    voyage: str, track: Track, held: Sequence[Hold], chain: list[int], nominal: float
 ) -> Found | None:
-    length_time = track.length / usual
+    length_time = track.length / nominal
     orders = [_order(track, held, i, length_time) for i in chain]
     side = math.copysign(1.0, held[chain[0]].angle)
     begin, end = orders[0], held[chain[-1]].end
-    if track.at(track.state[:, 1], begin) < MOVING * usual:
+    if track.at(track.state[:, 1], begin) < MOVING * nominal:
         return None
     before = approach_of(track, begin)
     straight = went_straight(track, begin, before)
@@ -282,11 +282,11 @@ def _swing_end(track: Track, end: float, held: Sequence[Hold], chain: list[int])
 # --- turns -----------------------------------------------------------------------------------
 
 
-def _turn(voyage: str, track: Track, held: Sequence[Hold], at: int, usual: float) -> Found | None:
-    hold, length_time = held[at], track.length / usual
+def _turn(voyage: str, track: Track, held: Sequence[Hold], at: int, nominal: float) -> Found | None:
+    hold, length_time = held[at], track.length / nominal
     side = math.copysign(1.0, hold.angle)
     begin = _order(track, held, at, length_time)
-    if track.at(track.state[:, 1], begin) < MOVING * usual:
+    if track.at(track.state[:, 1], begin) < MOVING * nominal:
         return None
     turned = side * (track.heading_at(hold.end) - track.heading_at(begin))
     if turned < LEAST_TURN:
@@ -368,12 +368,12 @@ def _spiral(voyage: str, track: Track, held: Sequence[Hold]) -> Found:
 # --- stops -----------------------------------------------------------------------------------
 
 
-def _stops(voyage: str, track: Track, usual: float) -> list[Found]:
+def _stops(voyage: str, track: Track, nominal: float) -> list[Found]:
     """The screw stopped or reversed at speed, until the ship has stopped or goes ahead again."""
     driven = track.screw
     if not len(driven) or not (driven > 0.0).any():
         return []
-    length_time = track.length / usual
+    length_time = track.length / nominal
     off = driven <= STOPPED_SCREW * float(np.quantile(driven[driven > 0.0], 0.9))
     edges = np.flatnonzero(np.diff(off.astype(int)) == 1)
     found = []
@@ -381,7 +381,7 @@ def _stops(voyage: str, track: Track, usual: float) -> list[Found]:
         begin = float(track.time[k])
         speed = float(track.state[k, 1])
         before = track.between(begin - length_time, begin)
-        if speed < AT_SPEED * usual or not len(before) or (before.screw <= 0.0).all():
+        if speed < AT_SPEED * nominal or not len(before) or (before.screw <= 0.0).all():
             continue
         ahead = np.flatnonzero(~off[k + 1 :])
         last = k + int(ahead[0]) if len(ahead) else len(track) - 1

@@ -84,9 +84,9 @@ def make(
         tracks = stretches.tracks(record)
         found += [(one, record) for one in recognition.recognise(name, tracks)]
     speeds = [one.approach.speed for one, _ in found if one.approach is not None]
-    usual = max(speeds, default=0.0)
+    nominal = max(speeds, default=0.0)
     entries = [
-        _recorded(one, rec, profile, sailors, deep, usual, scale, members) for one, rec in found
+        _recorded(one, rec, profile, sailors, deep, nominal, scale, members) for one, rec in found
     ]
     entries += by_the_book(profile, sailors, deep, scale, members)
     return Sheet(
@@ -96,7 +96,7 @@ def make(
     )  # fmt: skip
 
 
-ENGINE = (1.0, 0.75, 0.5, 0.25)  # of the run's usual speed: full, half, slow and dead slow ahead
+ENGINE = (1.0, 0.75, 0.5, 0.25)  # of the run's nominal speed: full, half, slow and dead slow ahead
 
 
 def _engine(sailors: Sequence[Sailor | None]) -> tuple[tuple[float, tuple[float, ...]], ...]:
@@ -156,7 +156,7 @@ def _recorded(
     profile: Profile,
     sailors: Sequence[Sailor | None],
     deep: Loaded | None,
-    usual: float,
+    nominal: float,
     scale: float,
     members: int,
 ) -> Entry:
@@ -185,7 +185,7 @@ def _recorded(
     return Entry(
         voyage=found.voyage, start=found.begin, kind=found.kind, name=found.name,
         angle=found.angle, heading=found.heading, side=found.side, conditions=cond,
-        why_not=sailed_in.why_not(found, cond, profile, usual, scale),
+        why_not=sailed_in.why_not(found, cond, profile, nominal, scale),
         notes=tuple(notes),
         drift=None if moved is None else (moved.speed, moved.direction_deg),
         lines=lines_of(

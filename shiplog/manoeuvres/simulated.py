@@ -2,7 +2,14 @@
 
 The interval is that of the members: draws of the coefficients (or the seeds of a network), each
 with a draw of the discrepancy that held-out voyages have shown (`simulation.discrepancy`). The
-value is the model's as it stands.
+value y is the model's as it stands, and the interval is that of the members over their median m,
+
+    y q₀.₀₅/m  to  y q₀.₉₅/m        of what is positive: distances, times, overshoots
+    y + q₀.₀₅ - m  to  y + q₀.₉₅ - m    of what may have either sign
+
+An overshoot or a period is no linear function of a disturbance: whatever its sign, it makes a
+period longer. The model was fitted to voyages in which the missing forces acted, so that what they
+do on average is in its coefficients, and must not be added to its value again.
 """
 
 from __future__ import annotations
@@ -147,7 +154,7 @@ def of_members(
 
 
 def intervals(each: Sequence[Mapping[str, float]], note: str = "") -> dict[str, Estimate]:
-    """Each quantity of the first member, with the middle 90 % of the others."""
+    """Each quantity of the first member, with the middle 90 % of the others about their median."""
     best, *others = each
     found = {}
     for name, value in best.items():
@@ -155,9 +162,16 @@ def intervals(each: Sequence[Mapping[str, float]], note: str = "") -> dict[str, 
         if not others:
             found[name] = Estimate(value, value, value, note)
         elif len(many) >= LEAST_SHARE * len(others):
-            low, high = np.quantile(many, (LOW, HIGH))
-            found[name] = Estimate(value, min(value, float(low)), max(value, float(high)), note)
+            low, high = _about(value, *np.quantile(many, (LOW, 0.5, HIGH)).tolist())
+            found[name] = Estimate(value, low, high, note)
     return found
+
+
+def _about(value: float, low: float, middle: float, high: float) -> tuple[float, float]:
+    """The quantiles, moved so that the median is the value."""
+    if value > 0.0 and low > 0.0:
+        return value * low / middle, value * high / middle
+    return value + low - middle, value + high - middle
 
 
 def of_sailed(

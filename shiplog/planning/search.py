@@ -147,7 +147,7 @@ class Search:
         return np.clip(rounded, self.limits.low, self.limits.high)
 
     def _sail(self, orders: np.ndarray) -> Sailed:
-        """From a straight approach at the usual speed; orders [N, K, A] SI are held, and the
+        """From a straight approach at the nominal speed; orders [N, K, A] SI are held, and the
         actuators follow as fast as they do."""
         own = self.sailor
         sticks = own.controls(own.speed)

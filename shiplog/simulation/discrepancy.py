@@ -3,8 +3,11 @@
     d' = -d/τ + s √(2/τ) w,   d(0) ~ N(0, s²)
 
 an Ornstein-Uhlenbeck process of each of u̇, v̇ and ṙ (Uhlenbeck & Ornstein 1930). Its sizes s are
-such that the rollouts of the run err as much as they did on voyages that no fit has used: the
-run's band (`prediction_interval`). A missing force stays while the motion does, so τ is long, and
+such that the rollouts of the run err as much, in the mean square, as they did on voyages that no
+fit has used: the growth of the run's band (`prediction_interval`). The band's factor is not used.
+It makes up for windows that err unlike others, and for few voyages; the mean square has both, and
+over simulated ships the factor made the intervals of manoeuvres wider than their errors
+(docs/evidence/manoeuvres.md). A missing force stays while the motion does, so τ is long, and
 grows with the dynamic pressure at hull and rudder: s is that of the training data, times
 
     q/q_training,   q = U² + ½ (n D)²
@@ -20,7 +23,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shiplog.nomenclature.channels import VELOCITY_IN_STATE
-from shiplog.nomenclature.numbers import NINETY_SPREADS
 from shiplog.simulation.members import Rates
 from shiplog.simulation.prediction_interval import Band
 
@@ -127,7 +129,7 @@ def calibrated(
     G = squares / max(taken, 1)  # [of u v r, by u v r]
     late = band.growth[len(band.growth) // 2 :, velocity]
     known = np.isfinite(late).all()
-    error = (late**2).mean(0) * (band.factor[velocity] / NINETY_SPREADS) ** 2
+    error = (late**2).mean(0)
     if not known or not np.isfinite(G).all() or not (error > 0.0).all():
         return plain
     found, _ = nnls(G / error[:, None], np.ones(3))

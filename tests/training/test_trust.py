@@ -88,3 +88,19 @@ def test_what_was_held_is_not_measured():
 def test_one_voyage_says_nothing_of_how_voyages_differ():
     only, _ = judged(100.0 * np.eye(2), pulls={"one": np.zeros(2)})
     assert only.between is None and only.voyages == 1 and only.verdict == "trusted"
+
+
+def test_on_new_voyages_the_data_say_less_and_what_was_known_before_stays():
+    """H/κ in the place of H: (H/κ + 1)⁻¹, also of coefficients that hide each other."""
+    spread, H = np.array([0.5, 2.0]), np.array([[9.0, 4.0], [4.0, 2.0]])
+    scale = np.outer(spread, spread)
+    covariance = np.linalg.inv(H + np.eye(2)) * scale
+    for kappa in (1.0, 3.0, 1e9):
+        wanted = np.linalg.inv(H / kappa + np.eye(2)) * scale
+        assert trust.on_new_voyages(covariance, spread, kappa) == pytest.approx(wanted)
+
+
+def test_a_coefficient_that_was_held_stays_certain():
+    found = trust.on_new_voyages(np.diag([0.01, 0.0]), np.array([0.5, 0.0]), 4.0)
+    assert found[1].tolist() == [0.0, 0.0]
+    assert found[0, 0] == pytest.approx(0.25 / (24.0 / 4.0 + 1.0))

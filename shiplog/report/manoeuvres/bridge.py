@@ -123,7 +123,7 @@ def _engine(sheet: Sheet) -> list[Block]:
     titles = ("order", *(actuators[i].name for i in driven), "speed of this sheet",
               "speed in ballast")  # fmt: skip
     return [Grid(titles, rows, titles[1:]), Paragraph([
-        "By the model, in calm and deep water. Full ahead is the usual speed of its voyages."
+        "By the model, in calm and deep water. Full ahead is the nominal speed of its voyages."
     ])]  # fmt: skip
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from shiplog.manoeuvres.entry import Drawn, Entry
 from shiplog.report import colours
 from shiplog.report.figures import style
+from shiplog.report.manoeuvres.sheet import head
 from shiplog.report.page.blocks import Drawn as Picture
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def picture(entry: Entry, name: str) -> Picture | None:
         if on_path
         else "Heading against that of the approach, and the rudder."
     )
-    return Picture(svg, f"{entry.name}. {words}", entry.name)
+    return Picture(svg, words, head(entry))
 
 
 def draw(axes: Axes, entry: Entry) -> None:

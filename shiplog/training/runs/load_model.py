@@ -142,7 +142,7 @@ class Run(RunFolder, ABC):
         inputs    time [s], a column an actuator [SI], and `member` where members differ; or a
                   manoeuvre of `shiplog.simulation.schedules`
         start     a row a member of the state's channels, over ground; what is left out is zero,
-                  and the surge the run's usual speed
+                  and the surge the run's nominal speed
         water     wind and current
         spread    members beyond the first are drawn as the model may be as well
         seconds   as long as the inputs unless given

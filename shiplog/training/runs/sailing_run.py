@@ -240,7 +240,9 @@ class Sailor:
         own = self.speed if speed is None else speed
         found = []
         if speed is None:
-            found.append(f"The approach is at {own:.3g} m/s, the usual speed of its training data.")
+            found.append(
+                f"The approach is at {own:.3g} m/s, the nominal speed of its training data."
+            )
         sticks = self.controls(own)
         if not sticks.balanced and not isinstance(manoeuvre, Schedule):
             found.append(

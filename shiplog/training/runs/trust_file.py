@@ -53,7 +53,8 @@ def judge(run: PhysicalRun) -> tuple[CoefficientTrust, ...]:
     cut = windows.cut(run.training(), run.windows(), run.config.window, *names)
     data, count = series(cut), identified.height
     every = normal(simulator.model, simulator.theta, data, tuple(range(count)))
-    variance = residual_variance(every.loss, data)
+    kappa = _factor(run, every.loss)
+    variance = kappa * residual_variance(every.loss, data)
     voyages = np.array(cut.plan["voyage"].to_list())
     grams, pulls = {}, {}
     for voyage in dict.fromkeys(voyages.tolist()):
@@ -61,10 +62,26 @@ def judge(run: PhysicalRun) -> tuple[CoefficientTrust, ...]:
         one = normal(simulator.model, simulator.theta, own, tuple(range(count)))
         grams[voyage], pulls[voyage] = one.gram / variance, one.pull.sum(0) / variance
     nominal = run.nominal()
+    covariance = trust.on_new_voyages(
+        simulator.covariance[:count, :count], identified["spread"].to_numpy(), kappa
+    )
     return trust.judge(
-        identified, simulator.covariance[:count, :count], (nominal.low, nominal.high),
-        Information(grams, pulls), run.config.physics.parameters or nominal.source,
+        identified, covariance, (nominal.low, nominal.high), Information(grams, pulls),
+        run.config.physics.parameters or nominal.source,
     )  # fmt: skip
+
+
+def _factor(run: PhysicalRun, fitted: np.ndarray) -> float:
+    """κ of L of the training windows [N]; 1 of a run that held no voyage out."""
+    table = run.cross_validation()
+    if table is None:
+        return 1.0
+    held = table.filter(held_out="voyages").sort("window")["loss"].to_numpy()
+    if len(held) != len(fitted):
+        return 1.0
+    ends = np.isfinite(held) & np.isfinite(fitted)
+    mean = float(fitted[ends].mean()) if ends.any() else 0.0
+    return max(1.0, float(held[ends].mean()) / mean) if mean > 0.0 else 1.0
 
 
 def save(run: Run, judged: tuple[CoefficientTrust, ...]) -> None:
