@@ -119,11 +119,12 @@ HOUSE = (  # package, what it holds; from below, which is what is imported by al
      ("ship_profile", "the profile")),
     (("logs", "MCAP, other formats"), ("voyages", "10 Hz table, 1 Hz rows"),
      ("drafting", "of profiles")),
-    (("models", "mmg, networks, causes"), ("foreign", "FMU, callable, logged"), ("simulation", "rollouts, L, coverage"),
-     ("training", "recipes, runs")),
+    (("models", "mmg, networks, causes"), ("foreign", "FMU, callable, logged"),
+     ("simulation", "rollouts, L, coverage"), ("training", "recipes, runs")),
     (("diagnosis", "segments to verdict"), ("manoeuvres", "found, measured, sailed"),
      ("planning", "what to sail next"), ("report", "page, figures, viewer")),
-    (("export", "other programs' files"), ("commands", "steps of each command"), ("cli", "arguments, printing")),
+    (("export", "other programs' files"), ("commands", "steps of each command"),
+     ("cli", "arguments, printing")),
 )  # fmt: skip
 
 
