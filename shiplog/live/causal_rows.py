@@ -22,15 +22,17 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 
+from shiplog.live.health import Heard
 from shiplog.live.messages import Window
 from shiplog.logs.health.health_report import Finding
 from shiplog.logs.reading.read import Contents, Health, Reading, Topic
+from shiplog.nomenclature.units import SECOND_NS
 from shiplog.ship_profile.profile import Profile
 from shiplog.voyages.ingest import alignment
 from shiplog.voyages.rows import fault_detection, resampling
@@ -44,7 +46,6 @@ SETTLED_S = 1.0  # beyond what the slowest rule waits for
 QUICK_S = 12.0  # of messages from which a provisional row is worked out
 EVERY_S = 5.0  # s of rows that are made final at once
 FIRST_S = 8.0  # s of messages before the first row: that the sources begin together shows by then
-SECOND_NS = 1_000_000_000
 
 
 @dataclass(frozen=True)
@@ -54,13 +55,16 @@ class Rows:
     final        rows that no rule changes any more, those of earlier looks left out
     provisional  all rows behind the last final one
     revised      rows whose value or mark is another than the last look gave
-    findings     of the window: of what `ingest` would say
+    heard        source → when it was heard last, by the clock of its rows
+    findings     of what `ingest` would say of the window; of now is what ends after `recent_s`
     """
 
     final: pl.DataFrame
     provisional: pl.DataFrame
     revised: int
+    heard: Mapping[str, Heard] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
+    recent_s: float = 0.0
 
 
 class CausalRows:
@@ -109,7 +113,10 @@ class CausalRows:
         if final.height:
             self.done = int(final["time"].to_physical()[-1])
         self._shown = provisional
-        return Rows(final, provisional, revised, findings)
+        heard = {name: Heard(int(one.time[-1]), one.period_s) for name, one in sampled.every.items()
+                 if len(one.time) and not one.hold}  # fmt: skip
+        recent = (sampled.end - sampled.start) * 1e-9 - self.delay_s - EVERY_S
+        return Rows(final, provisional, revised, heard, findings, recent)
 
     def _due(self, window: Window) -> bool:
         assert self.done is not None
@@ -175,8 +182,6 @@ def as_reading(
 @contextmanager
 def quietly() -> Iterator[None]:
     """Without the words that are said once of a log, and would be said at each look."""
-    log = logging.getLogger("shiplog")
-    before = log.disabled, log.level
     loggers: Mapping[str, logging.Logger] = {
         name: one for name, one in logging.root.manager.loggerDict.items()
         if name.startswith(("shiplog.voyages", "shiplog.logs")) and isinstance(one, logging.Logger)
@@ -189,4 +194,3 @@ def quietly() -> Iterator[None]:
     finally:
         for name, one in loggers.items():
             one.disabled = kept[name]
-        log.disabled, _ = before

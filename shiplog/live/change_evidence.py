@@ -11,22 +11,28 @@ numbers d ~ N(0, I) in plausible sizes, is
 
     log F_hk = ½ tᵀ (I + A)⁻¹ t - ½ log|I + A|
 
-The statistic of the watch is their sum over all beginnings and the mean over causes
+The statistic of the watch is their mean over causes and over how long ago the change began, with a
+prior that is even in the logarithm of that time (j segments ago, of at most J),
 
-    Z_n = Σ_k (1/H) Σ_h F_hk(n)
+    Z_n = Σ_k π_{n-k} (1/H) Σ_h F_hk(n),   π_j = 1/((j + 1) Σ_i 1/(i + 1))
 
-whose expectation grows by one a segment while nothing changes (Shiryaev-Roberts; of composite
-alternatives: an e-detector). A beginning within an earlier part is taken for that of the part; a
-part that is older than MOST_PARTS is forgotten, and so is a change that began before it.
+so that its expectation is no more than one at any time while nothing changes: a watch of days is no
+more alarmed than one of an hour. A beginning within an earlier part is taken for that of the part;
+a part that is older than MOST_PARTS is forgotten, and so is a change that began before it.
 
-A segment that no cause explains would be evidence for whichever comes nearest. So a segment counts
-for w_s = min(1, CALM χ̃²/χ²_s), with χ²_s what is left when all numbers and causes are fitted to it
-alone, and χ̃² the median of that over the nominal campaign. χ²_s itself is watched, too
-(`unexplained`): something then pushes, or measures, as no cause of the bank does.
+A model has errors that last for half a minute and are no change of anything: a hard manoeuvre, the
+wash of a ferry. So no segment may say more than MOST_NATS by itself: it counts for
+
+    w_s = min(1, MOST_NATS / max_h log F_h(s alone))
+
+and what raises an alarm is several segments that say the same. What is left of a segment when all
+numbers and causes are fitted to it alone, χ²_s, is watched, too (`unexplained`): then something
+pushes, or measures, as no cause of the bank does.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -34,7 +40,9 @@ import numpy as np
 
 PART = 20  # segments, as of a campaign's parts
 MOST_PARTS = 48  # 8 h of a ship of three metres
-CALM = 1.5  # medians of χ², beyond which a segment counts for less
+MOST_NATS = (
+    1.5  # of one segment: with 3.0 alarms are half as late, and false ones three times as many
+)
 
 
 @dataclass(frozen=True)
@@ -83,7 +91,7 @@ class ChangeEvidence:
 
     def add(self, product: np.ndarray) -> Evidence:
         """One more segment of products H_s [N, N]."""
-        r, _, n = self.widths
+        n = self.widths[2]
         if len(self.since) == PART:
             self.parts = [*self.parts, self._without_part()][-MOST_PARTS:]
             self.total[:] = 0.0
@@ -107,7 +115,7 @@ class ChangeEvidence:
     def _reduced(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """t [K, n], A [K, n, n] for each beginning k, the latest first, and how many segments each
         k stands for [K]."""
-        r, q, n = self.widths
+        r, q, _ = self.widths
         S = self._inverse_part()
         since = np.stack(self.since[::-1])  # [K, N, n]
         of_e, of_part = self.total[1 : 1 + r, 0], since[:, 1 : 1 + r]
@@ -131,15 +139,28 @@ class ChangeEvidence:
         return t, A, stands
 
     def _evidence(self, t: np.ndarray, A: np.ndarray, stands: np.ndarray) -> Evidence:
-        factors = np.stack([_factor(t[:, at], A[:, at[:, None], at]) for at in self.causes.values()])
+        each = [_factor(t[:, at], A[:, at[:, None], at]) for at in self.causes.values()]
+        factors = np.stack(each)
         began = np.cumsum(stands).astype(int)
         best = factors.argmax(1)
-        whole = factors + np.log(stands) - np.log(len(factors))
+        whole = factors + np.log(_prior_of_ages(stands)) - math.log(len(factors))
         return Evidence(
             float(np.logaddexp.reduce(whole, axis=None)),
             {label: float(factors[i, best[i]]) for i, label in enumerate(self.causes)},
             {label: int(began[best[i]]) for i, label in enumerate(self.causes)},
         )
+
+    def alone(self, product: np.ndarray) -> float:
+        """max_h log F_h of one segment by itself, of products H_s [N, N]."""
+        one = ChangeEvidence(self.widths, self.causes)
+        return max(one.add(product).factors.values())
+
+
+def _prior_of_ages(stands: np.ndarray) -> np.ndarray:
+    """π [K] of beginnings that stand for so many segments each, the latest first."""
+    ends = np.cumsum(stands)
+    whole = np.log(MOST_PARTS * PART) + np.euler_gamma
+    return (np.log(ends + 0.5) - np.log(ends - stands + 0.5)) / whole
 
 
 def _factor(t: np.ndarray, A: np.ndarray) -> np.ndarray:
@@ -157,6 +178,6 @@ def unexplained(product: np.ndarray, counts: float) -> float:
     return float(H[0, 0] - across @ np.linalg.solve(np.eye(len(across)) + H[1:, 1:], across))
 
 
-def weight(square: float, median: float) -> float:
-    """w_s = min(1, CALM χ̃²/χ²_s)."""
-    return min(1.0, CALM * median / max(square, 1e-9))
+def weight(alone: float) -> float:
+    """w_s = min(1, MOST_NATS / max_h log F_h)."""
+    return min(1.0, MOST_NATS / max(alone, 1e-9))

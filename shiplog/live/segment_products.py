@@ -116,9 +116,7 @@ def grams(ref: Reference, grid: SegmentGrid, record: Record, rows: np.ndarray) -
         cut, moved, observed = read(ref.model, ref.setting, record, some, {})
         about = ref.expected_acceleration(cut, grid)
         path = linearisation.fit_path(ref.model, whole, cut, grid, wide, about=about)
-        linear = linearisation.linear(
-            ref.model, whole, cut, grid, path, moved, observed, ref.wide
-        )
+        linear = linearisation.linear(ref.model, whole, cut, grid, path, moved, observed, ref.wide)
         each = [np.array([i]) for i in range(len(some))]
         for one, lost in zip(part_products.passes(
             linear, ref.process_noise, each, ref.columns.unit, None, acting

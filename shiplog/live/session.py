@@ -1,0 +1,214 @@
+"""One watch: a source, a run, and what is reported step by step.
+
+A step looks at the source once, takes some seconds of messages, and gives the events that follow.
+Nothing in it waits or asks for the time: whoever steps brings it. So a test drives a watch as fast
+as it likes, and the same messages give the same events.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from shiplog.exceptions import ShiplogError
+from shiplog.live import evidence_file, kept
+from shiplog.live.alarm import Alarm, Watcher
+from shiplog.live.calibration import Calibration
+from shiplog.live.causal_rows import CausalRows, Rows
+from shiplog.live.error_now import ErrorNow
+from shiplog.live.events import Event, RowsCame, SegmentDone
+from shiplog.live.finished_segments import FinishedSegments, Segment
+from shiplog.live.health import Health, Notice
+from shiplog.live.kept import KeptRows, Saved
+from shiplog.live.messages import Inflow, Window
+from shiplog.live.nominal import Nominal
+from shiplog.live.sources.base import Source
+from shiplog.nomenclature.units import SECOND_NS
+from shiplog.training.runs.load_model import Run
+
+SLICE_S = 10.0  # s of messages of one step, where more have come: as in a replay
+BREAK_S = 600.0  # s without a message, after which another voyage begins
+
+
+@dataclass
+class Watch:
+    """nominal, calibration, watcher   None where there can be no alarm
+    out     its own folder; None where nothing is kept
+    """
+
+    run: Run
+    source: Source
+    nominal: Nominal | None = None
+    calibration: Calibration | None = None
+    watcher: Watcher | None = None
+    out: Path | None = None
+    window: Window = field(default_factory=lambda: Window(90.0))
+    inflow: Inflow = field(default_factory=Inflow)
+    health: Health = field(default_factory=Health)
+    rows: CausalRows = field(init=False)
+    errors: ErrorNow = field(init=False)
+    segments: FinishedSegments | None = None
+    kept_rows: KeptRows | None = None
+    last_arrival: int | None = None
+    resume_after: int = 0  # ns: final rows up to here were dealt with before a kill
+    ended: bool = False
+
+    def __post_init__(self) -> None:
+        self.rows = CausalRows(self.run.profile, self.source.name)
+        self.errors = ErrorNow(self.run)
+        if self.nominal is not None:
+            self.segments = FinishedSegments(self.nominal)
+        if self.out is not None:
+            self.kept_rows = KeptRows(self.out / kept.ROWS)
+
+    def step(self, clock: int) -> Iterator[Event]:
+        """Look once, at this machine's time [ns]; the events that follow."""
+        waiting = bool(self.inflow)
+        if not waiting:  # else what came before is dealt with first
+            yield from self._arrive(clock)
+        if self.inflow:
+            self._take(self.inflow.take(SLICE_S))
+            yield from self._look(end=False)
+        elif self.ended:
+            yield from self._look(end=True)
+
+    @property
+    def done(self) -> bool:
+        """Whether the source has ended and all of it was dealt with."""
+        return self.ended and not self.inflow
+
+    @property
+    def busy(self) -> bool:
+        """Whether there is more to deal with at once."""
+        return bool(self.inflow)
+
+    def _arrive(self, clock: int) -> Iterator[Event]:
+        arrived = self.source.look(clock)
+        for note in arrived.notes:
+            yield from self.health.once("source", "source", note, clock)
+        if arrived.anew:
+            yield from self._begin_anew()
+        self.window.metadata = {k: dict(v) for k, v in arrived.metadata.items()}
+        self.window.topics |= arrived.topics
+        self.inflow.add(arrived.frames)
+        if arrived.count:
+            self.last_arrival = clock
+        if self.last_arrival is None:
+            self.last_arrival = clock
+        self.ended = arrived.ended
+        if not arrived.ended:
+            yield from self.health.arrivals(self.last_arrival, clock, self.source.name)
+        newest = max(
+            (int(f["log_time"].max() or 0) for f in arrived.frames.values() if f.height),  # type: ignore[arg-type]
+            default=0,
+        )
+        if newest:
+            yield from self.health.clock(newest, clock, self.source.live)
+
+    def _take(self, frames) -> None:
+        oldest = min((int(f["log_time"].min() or 0) for f in frames.values() if f.height),
+                     default=0)  # fmt: skip
+        if self.window.newest and oldest - self.window.newest > BREAK_S * SECOND_NS:
+            list(self._begin_anew())
+        self.window.add(frames)
+
+    def _look(self, end: bool) -> Iterator[Event]:
+        newest = self.window.newest
+        if not newest:
+            return
+        try:
+            rows = self.rows.look(self.window, end)
+        except ShiplogError as error:
+            yield from self.health.once("refused", "log", error.message, newest)
+            return
+        if rows is None:
+            return
+        yield from self.health.channels(rows.heard, newest)
+        yield from self.health.faults(rows.findings, rows.recent_s, newest)
+        yield RowsCame(rows.final, rows.provisional, rows.revised, self.rows.delay_s)
+        final = rows.final
+        if self.resume_after:
+            final = final.filter(final["time"].to_physical() > self.resume_after)
+        if final.height or rows.provisional.height:
+            yield from self.errors.look(final, rows.provisional)
+        if self.kept_rows is not None:
+            self.kept_rows.add(final)
+        if self.segments is not None:
+            yield from self._segments(rows, final, end)
+
+    def _segments(self, rows: Rows, final, end: bool) -> Iterator[Event]:
+        assert self.segments is not None
+        if self.health.bad and final.height:
+            times = final["time"].to_physical()
+            self.segments.distrust(int(times[0]), int(times[-1]) + 1)
+        if not final.height and not end:
+            return
+        for segment in self.segments.add(final, end):
+            yield from self._segment(segment)
+
+    def _segment(self, segment: Segment) -> Iterator[Event]:
+        watcher = self.watcher
+        if watcher is None or not np.isfinite(segment.gram).all() or segment.gram[0, 0] <= 0.0:
+            return
+        alarm: Alarm | None = watcher.add(segment.gram, segment.end)
+        assert watcher.latest is not None
+        yield SegmentDone(
+            segment.end, watcher.latest.total, watcher.thresholds.change, watcher.square,
+            watcher.latest.suspects[0],
+        )  # fmt: skip
+        if alarm is not None:
+            yield alarm
+        self.save()
+
+    def _begin_anew(self) -> Iterator[Event]:
+        """Another voyage: what is left of the one before is final."""
+        if self.window.newest:
+            yield from self._look(end=True)
+        self.window.clear()
+        self.rows = CausalRows(self.run.profile, self.source.name)
+        self.errors = ErrorNow(self.run)
+        if self.nominal is not None:
+            self.segments = FinishedSegments(self.nominal)
+        self.resume_after = 0
+
+    # --- to go on after the process has ended -------------------------------------------------
+
+    def save(self) -> None:
+        """What another process needs to go on, where there is a folder for it."""
+        if self.out is None or self.watcher is None or self.calibration is None:
+            return
+        begin = self.segments.begin if self.segments is not None else 0
+        facts = {
+            "run": self.calibration.identity, "source": self.source.name,
+            "place": self.source.place(), "begin": begin,
+            "anchor": self.rows.anchor, "datum": self.rows.datum,
+        } | evidence_file.facts(self.watcher)  # fmt: skip
+        if self.kept_rows is not None:
+            self.kept_rows.flush_if_old()
+        kept.save(self.out, Saved(facts, evidence_file.arrays(self.watcher)))
+
+    def resume(self, saved: Saved) -> bool:
+        """Go on from there; False where it is of another run or source, and nothing is taken."""
+        facts = saved.facts
+        if self.watcher is None or self.calibration is None:
+            return False
+        if facts.get("run") != self.calibration.identity or facts["source"] != self.source.name:
+            return False
+        if not evidence_file.restore(self.watcher, saved.arrays, facts):
+            return False
+        begin = int(facts.get("begin") or 0)
+        if self.segments is not None:
+            self.segments.begin = begin
+        if facts.get("anchor"):
+            self.rows.anchor = int(facts["anchor"])
+            datum = facts.get("datum")
+            self.rows.datum = None if datum is None else (float(datum[0]), float(datum[1]))
+        return True
+
+
+def notices(events: list[Event]) -> list[Notice]:
+    """Those of them."""
+    return [event for event in events if isinstance(event, Notice)]
