@@ -1,9 +1,9 @@
 """Is it the ship, or what is measured of it? Asked before any suspicion.
 
-A channel is silent when its last sample is older than MOST_MISSED of its periods and SILENT_S; it is
-faulty while `ingest` would leave its rows out. The source is silent when nothing arrived for
-QUIET_S by this machine's clock. The recorder's clock is compared with this machine's while messages
-arrive one by one: a file that is read again lies behind it, and says nothing of a clock.
+A channel is silent when its last sample is older than MOST_MISSED of its periods and SILENT_S; it
+is faulty while `ingest` would leave its rows out. The source is silent when nothing arrived for
+QUIET_S by this machine's clock. The recorder's clock is compared with this machine's while
+messages arrive one by one: a file that is read again lies behind it, and says nothing of a clock.
 """
 
 from __future__ import annotations

@@ -18,6 +18,7 @@ import polars as pl
 
 from pipelines.experiments.other_families import cases as abroad
 from pipelines.experiments.other_families import instruments as abroad_instruments
+from pipelines.experiments.other_families.effects import offered as abroad_offered
 from pipelines.experiments.other_families.voyage import sail as sail_abroad
 from pipelines.experiments.simulated_ship import cases as home
 from pipelines.experiments.simulated_ship import sensors as home_instruments
@@ -47,6 +48,14 @@ FIVE = (
     Ship("home1", 9101), Ship("home2", 9102), Ship("home3", 9103),
     Ship("abkowitz", 9104, "abkowitz"), Ship("catamaran", 9105, "catamaran"),
 )  # fmt: skip
+
+
+def offered(ship: Ship) -> list[str]:
+    """Names of what can be hidden in its catalogue."""
+    if not ship.family:
+        return list(home.CATALOGUE)
+    drawn = abroad.FAMILIES[ship.family](ship.seed)
+    return [name for name in abroad_offered(drawn) if name in abroad.CATALOGUE]
 
 
 def leg(ship: Ship, number: int, seconds: float = LEG_S) -> list[Series]:
