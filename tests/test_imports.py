@@ -25,6 +25,7 @@ ROWS = {
     "manoeuvres": "recognition, quantities, criteria",
     "planning": "what to sail next, and what it would show",
     "report": "verdict, pages, tables, viewer",
+    "live": "a model beside its ship: causal rows, error, evidence, alarm",
     "commands": "what each command does, and its answer",
     "cli": "arguments and printing",
 }
@@ -44,8 +45,8 @@ ROOMS = {
 LEVEL = {name: level for level, name in enumerate(ROWS)}
 SOURCES = sorted((ROOT / "shiplog").rglob("*.py"))
 ONLY = {  # a library, and the packages and modules that may import it
-    "mcap": {"logs"}, "mcap_protobuf": {"logs"}, "mcap_ros2": {"logs"}, "pynmea2": {"logs"},
-    "rosbags": {"logs"}, "rerun": {"logs", "report"}, "ray": {"training"},
+    "mcap": {"logs", "live"}, "mcap_protobuf": {"logs"}, "mcap_ros2": {"logs"}, "pynmea2": {"logs"},
+    "rosbags": {"logs"}, "rerun": {"logs", "report", "live"}, "ray": {"training"},
     "matplotlib": {"report"}, "jinja2": {"report"}, "typer": {"cli"}, "pickle": set(),
     "torch": {"training", "shiplog.models.feedforward"}, "pymavlink": {"logs"},
 }  # fmt: skip

@@ -24,6 +24,7 @@ from shiplog.cli import (
     simulate,
     train,
     voyages,
+    watch,
 )
 
 COMMANDS = (
@@ -38,6 +39,7 @@ COMMANDS = (
     evaluate.evaluate,
     compare.compare,
     diagnose.diagnose,
+    watch.watch,
     simulate.simulate,
     manoeuvres.manoeuvres,
     plan.plan,

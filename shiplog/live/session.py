@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from shiplog.exceptions import ShiplogError
-from shiplog.live import evidence_file, kept
+from shiplog.exceptions import ShiplogError, listed
+from shiplog.live import evidence_file, kept, kept_voyage
 from shiplog.live.alarm import Alarm, Watcher
 from shiplog.live.calibration import Calibration
 from shiplog.live.causal_rows import CausalRows, Rows
@@ -28,7 +28,9 @@ from shiplog.live.nominal import Nominal
 from shiplog.live.sources.base import Source
 from shiplog.nomenclature.units import SECOND_NS
 from shiplog.training.runs.load_model import Run
+from shiplog.voyages.store.store import Store
 
+KEEP_S = 600.0  # s of rows after an alarm began, with which a diagnosis is worth its time
 SLICE_S = 10.0  # s of messages of one step, where more have come: as in a replay
 BREAK_S = 600.0  # s without a message, after which another voyage begins
 
@@ -55,6 +57,7 @@ class Watch:
     last_arrival: int | None = None
     resume_after: int = 0  # ns: final rows up to here were dealt with before a kill
     ended: bool = False
+    alarmed: int | None = None  # ns, when what an alarm is about began; None once it is kept
 
     def __post_init__(self) -> None:
         self.rows = CausalRows(self.run.profile, self.source.name)
@@ -126,6 +129,7 @@ class Watch:
             return
         if rows is None:
             return
+        yield from self._missing(newest)
         yield from self.health.channels(rows.heard, newest)
         yield from self.health.faults(rows.findings, rows.recent_s, newest)
         yield RowsCame(rows.final, rows.provisional, rows.revised, self.rows.delay_s)
@@ -138,6 +142,15 @@ class Watch:
             self.kept_rows.add(final)
         if self.segments is not None:
             yield from self._segments(rows, final, end)
+
+    def _missing(self, time: int) -> Iterator[Event]:
+        """Topics of the profile that the source does not have."""
+        for topic in sorted(set(self.run.profile.wanted()) - self.window.topics):
+            there = listed(sorted(self.window.topics))
+            yield from self.health.once(
+                "missing", topic,
+                f"{self.source.name} has no topic {topic!r} so far. Topics found: {there}.", time,
+            )  # fmt: skip
 
     def _segments(self, rows: Rows, final, end: bool) -> Iterator[Event]:
         assert self.segments is not None
@@ -160,8 +173,35 @@ class Watch:
             watcher.latest.suspects[0],
         )  # fmt: skip
         if alarm is not None:
+            if not alarm.again:
+                began = [one.began for one in alarm.suspects[:1]]
+                self.alarmed = min([*began, segment.start])
             yield alarm
         self.save()
+
+    def finish(self, clock: int) -> Iterator[Event]:
+        """All that came is final, once the source is closed."""
+        while self.inflow:
+            self._take(self.inflow.take(SLICE_S))
+            yield from self._look(end=False)
+        yield from self._look(end=True)
+        if self.kept_rows is not None:
+            self.kept_rows.flush()
+
+    def keep_voyage(self, store: Store, last: bool) -> str:
+        """Where an alarm has stood for KEEP_S, or the watch ends with one: the rows since the
+        suspected beginning as a voyage of the store, once an alarm; its name, or nothing."""
+        if self.alarmed is None or self.kept_rows is None or self.out is None:
+            return ""
+        since = self.alarmed
+        table = self.kept_rows.table(since)
+        if table is None or table.height < 2:
+            return ""
+        lasted = int(table["time"].to_physical()[-1]) - since
+        if not last and lasted < KEEP_S * SECOND_NS:
+            return ""
+        self.alarmed = None
+        return kept_voyage.add(store, table, self.run.profile, self.out, self.rows.datum)
 
     def _begin_anew(self) -> Iterator[Event]:
         """Another voyage: what is left of the one before is final."""
