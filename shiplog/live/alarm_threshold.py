@@ -25,9 +25,9 @@ import numpy as np
 
 DAY_S = 86_400.0
 STRETCH = 20  # segments, of which one peak is taken: those of a part of a campaign
-PSEUDO_PEAKS = 20.0
+PSEUDO_PEAKS = 10.0
 # nats; of log Z_n and of log χ²_s, from peaks of effect-free sailing of five simulated ships
-SCALE, UNEXPLAINED_SCALE = 1.3, 0.09
+SCALE, UNEXPLAINED_SCALE = 1.3, 0.12
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
     python -m pipelines.experiments.watching.segments_kept SHIPS OUT --legs 20 [--first 0]
     python -m pipelines.experiments.watching.segments_kept SHIPS OUT --half-way 60
+    python -m pipelines.experiments.watching.segments_kept SHIPS OUT --calibrate
 
 SHIPS holds a folder a ship with `store` and `base`, as `hidden_effects` makes them.
 """
@@ -15,7 +16,9 @@ import numpy as np
 
 from pipelines.experiments.watching import sailing
 from shiplog.diagnosis.linear import segments
-from shiplog.live import nominal, segment_products
+from shiplog.live import calibration, nominal, segment_products
+from shiplog.live.alarm import places
+from shiplog.live.alarm_threshold import peaks_of
 from shiplog.live.nominal import Nominal
 from shiplog.machine import files
 from shiplog.training.runs import load_model
@@ -43,6 +46,21 @@ def products(of: Nominal, record: Record, directions: segment_products.Direction
     rows = segments.begins(record)
     grams = segment_products.grams(of.campaign.reference, of.grid, record, rows)
     return np.stack([directions.products(one) for one in grams])
+
+
+def keep_calibrations(there: dict[sailing.Ship, Nominal], maps: dict, out: Path) -> None:
+    """What the nominal campaign of each ship says of its alarm, as `shiplog watch` learns it."""
+    for ship, of in there.items():
+        totals, squares = calibration.watched_voyages(of)
+        median = float(np.median(squares))
+        peaks = np.concatenate([peaks_of(one) for one in totals if one])
+        logs = peaks_of(np.log(np.array(squares) / median).tolist())
+        causes = {f"cause {label}": at for label, at in places(maps[ship].causes).items()}
+        np.savez(
+            out / f"calibration-{ship.name}.npz", peaks=peaks, logs=logs, median=median,
+            segments=len(squares), segment_s=of.grid.seconds, widths=maps[ship].widths,
+            counts=maps[ship].counts, **causes,
+        )  # fmt: skip
 
 
 def half_ways(there: dict[sailing.Ship, Nominal], count: int) -> list[tuple[sailing.Ship, str]]:
@@ -86,12 +104,16 @@ def main() -> None:
     parser.add_argument("--legs", type=int, default=20)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--half-way", type=int, default=0)
+    parser.add_argument("--calibrate", action="store_true")
     parser.add_argument("--only", nargs="*", default=())
     given = parser.parse_args()
     given.out.mkdir(parents=True, exist_ok=True)
     ships = [s for s in sailing.FIVE if not given.only or s.name in given.only]
     there = {s: campaign_of(given.ships / s.name) for s in ships if (given.ships / s.name).exists()}
     maps = {s: segment_products.directions(of.campaign) for s, of in there.items()}
+    if given.calibrate:
+        keep_calibrations(there, maps, given.out)
+        return
     if given.half_way:
         keep_half_ways(there, maps, given.out, given.half_way)
         return
