@@ -12,6 +12,9 @@ too few for β. So β is shrunk towards what other ships showed, which counts as
 
     β = (PSEUDO_PEAKS β₀ + n s √6/π) / (PSEUDO_PEAKS + n),   s their standard deviation
 
+A voyage that is left out still shared in the fit of coefficients and noise, so that a new voyage is
+further from the model: μ is raised by OPTIMISM.
+
 Rates that the campaign is too short to show, and that is most, are extrapolated, and said to be so.
 """
 
@@ -28,6 +31,8 @@ STRETCH = 20  # segments, of which one peak is taken: those of a part of a campa
 PSEUDO_PEAKS = 10.0
 # nats; of log Z_n and of log χ²_s, from peaks of effect-free sailing of five simulated ships
 SCALE, UNEXPLAINED_SCALE = 1.3, 0.12
+
+OPTIMISM = 0.4  # nats of log Z_n: new voyages of these ships less those of their campaigns
 
 
 @dataclass(frozen=True)
@@ -48,12 +53,14 @@ class Tail:
         return per_segment * self.segments < 1.0
 
 
-def tail_of(peaks: np.ndarray, segments: int, scale: float) -> Tail:
-    """From peaks [n] of as many stretches; `scale` β₀ of other ships."""
+def tail_of(peaks: np.ndarray, segments: int, scale: float, optimism: float = 0.0) -> Tail:
+    """From peaks [n] of as many stretches; `scale` β₀ of other ships, and by how much the peaks of
+    a new voyage are larger."""
     count = len(peaks)
     own = float(peaks.std(ddof=1)) * math.sqrt(6.0) / math.pi if count > 1 else scale
     beta = (PSEUDO_PEAKS * scale + count * own) / (PSEUDO_PEAKS + count)
-    return Tail(float(peaks.mean()) - np.euler_gamma * beta, beta, segments)
+    location = float(peaks.mean()) + optimism - np.euler_gamma * beta
+    return Tail(location, beta, segments)
 
 
 def peaks_of(totals: Sequence[float]) -> np.ndarray:

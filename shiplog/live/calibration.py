@@ -52,8 +52,8 @@ def calibrated(nominal: Nominal) -> Calibration:
         known = _made(nominal)
         _keep(kept, known)
     median, *numbers = known.tolist()
-    tails = Tail(*numbers[:2], int(numbers[2])), Tail(*numbers[3:5], int(numbers[5]))
-    return Calibration(directions, median, tails, nominal.grid.seconds)
+    change, other = (Tail(at, by, int(count)) for at, by, count in (numbers[:3], numbers[3:]))
+    return Calibration(directions, median, (change, other), nominal.grid.seconds)
 
 
 def watched_voyages(nominal: Nominal) -> tuple[list[list[float]], list[float]]:
@@ -87,7 +87,7 @@ def _made(nominal: Nominal) -> np.ndarray:
     median = float(np.median(squares))
     count = sum(map(len, totals))
     peaks = np.concatenate([peaks_of(one) for one in totals if one])
-    change = tail_of(peaks, count, alarm_threshold.SCALE)
+    change = tail_of(peaks, count, alarm_threshold.SCALE, alarm_threshold.OPTIMISM)
     logs = peaks_of(np.log(np.maximum(squares, 1e-9) / median).tolist())
     other = tail_of(logs, count, alarm_threshold.UNEXPLAINED_SCALE)
     numbers = [value for t in (change, other) for value in (t.location, t.scale, t.segments)]

@@ -8,6 +8,7 @@ messages arrive one by one: a file that is read again lies behind it, and says n
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -19,6 +20,7 @@ MOST_MISSED = 8.0  # periods without a sample
 QUIET_S = 5.0  # s without any message
 CLOCK_S = 1.0  # s, from which a clock ahead of this machine's is reported
 BEHIND_S = 60.0  # s, from which a source behind it is reported, once: it may be a recording
+WHEN = re.compile(r",? for [\d.]+ s from [\d.]+ s(?=\.)")
 CHANNEL_FAULTS = ("held", "status", "contradiction", "implausible", "clock_offset", "two_sources")
 
 
@@ -98,7 +100,7 @@ class Health:
         }  # fmt: skip
         found = []
         for channel, finding in lasting.items():
-            found += self._turn("fault", channel, True, time, finding.sentence, "")
+            found += self._turn("fault", channel, True, time, _of_now(finding.sentence), "")
         for _, channel in [key for key in self.now if key[0] == "fault" and key[1] not in lasting]:
             found += self._turn("fault", channel, False, time, "", f"{channel} is right again.")
         return found
@@ -123,3 +125,8 @@ class Health:
             del self.now[key]
             return [Notice(time, what, channel, right, over=True)]
         return []
+
+
+def _of_now(sentence: str) -> str:
+    """Without the seconds of the window that a finding counts from."""
+    return WHEN.sub("", sentence)

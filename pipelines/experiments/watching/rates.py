@@ -52,7 +52,7 @@ def known(folder: Path) -> dict[str, Known]:
             causes = {k.removeprefix("cause "): kept[k] for k in kept.files if k[:6] == "cause "}
             count = int(kept["segments"])
             tails = (
-                tail_of(kept["peaks"], count, alarm_threshold.SCALE),
+                tail_of(kept["peaks"], count, alarm_threshold.SCALE, alarm_threshold.OPTIMISM),
                 tail_of(kept["logs"], count, alarm_threshold.UNEXPLAINED_SCALE),
             )
             name = path.stem.removeprefix("calibration-")

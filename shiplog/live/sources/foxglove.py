@@ -16,6 +16,7 @@ from __future__ import annotations
 import base64
 import binascii
 import contextlib
+import importlib
 import json
 import queue
 import struct
@@ -43,7 +44,7 @@ class Foxglove:
 
     def __init__(self, address: str, wanted: Mapping[str, Collection[str]]) -> None:
         try:
-            from websockets.sync import client
+            client = importlib.import_module("websockets.sync.client")
         except ImportError as error:
             raise ShiplogError(
                 "A Foxglove WebSocket needs the library websockets, which is not installed.",
