@@ -28,9 +28,9 @@ import numpy as np
 
 DAY_S = 86_400.0
 STRETCH = 20  # segments, of which one peak is taken: those of a part of a campaign
-PSEUDO_PEAKS = 10.0
+PSEUDO_PEAKS = 20.0
 # nats; of log Z_n and of log χ²_s, from peaks of effect-free sailing of five simulated ships
-SCALE, UNEXPLAINED_SCALE = 1.3, 0.12
+SCALE, UNEXPLAINED_SCALE = 1.8, 0.12
 
 OPTIMISM = 0.4  # nats of log Z_n: new voyages of these ships less those of their campaigns
 

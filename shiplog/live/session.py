@@ -30,6 +30,7 @@ from shiplog.nomenclature.units import SECOND_NS
 from shiplog.training.runs.load_model import Run
 from shiplog.voyages.store.store import Store
 
+SAVED_S = 5.0  # s by this machine's clock between two writings of the state
 KEEP_S = 600.0  # s of rows after an alarm began, with which a diagnosis is worth its time
 SLICE_S = 10.0  # s of messages of one step, where more have come: as in a replay
 BREAK_S = 600.0  # s without a message, after which another voyage begins
@@ -57,6 +58,8 @@ class Watch:
     last_arrival: int | None = None
     resume_after: int = 0  # ns: final rows up to here were dealt with before a kill
     ended: bool = False
+    _clock: int = 0
+    _saved_at: int = 0
     alarmed: int | None = None  # ns, when what an alarm is about began; None once it is kept
 
     def __post_init__(self) -> None:
@@ -69,6 +72,7 @@ class Watch:
 
     def step(self, clock: int) -> Iterator[Event]:
         """Look once, at this machine's time [ns]; the events that follow."""
+        self._clock = clock
         waiting = bool(self.inflow)
         if not waiting:  # else what came before is dealt with first
             yield from self._arrive(clock)
@@ -134,14 +138,14 @@ class Watch:
         yield from self.health.faults(rows.findings, rows.recent_s, newest)
         yield RowsCame(rows.final, rows.provisional, rows.revised, self.rows.delay_s)
         final = rows.final
-        if self.resume_after:
+        if self.resume_after:  # rows that were dealt with before; a segment may begin in them
             final = final.filter(final["time"].to_physical() > self.resume_after)
         if final.height or rows.provisional.height:
             yield from self.errors.look(final, rows.provisional)
         if self.kept_rows is not None:
             self.kept_rows.add(final)
         if self.segments is not None:
-            yield from self._segments(rows, final, end)
+            yield from self._segments(rows, end)
 
     def _missing(self, time: int) -> Iterator[Event]:
         """Topics of the profile that the source does not have."""
@@ -152,8 +156,9 @@ class Watch:
                 f"{self.source.name} has no topic {topic!r} so far. Topics found: {there}.", time,
             )  # fmt: skip
 
-    def _segments(self, rows: Rows, final, end: bool) -> Iterator[Event]:
+    def _segments(self, rows: Rows, end: bool) -> Iterator[Event]:
         assert self.segments is not None
+        final = rows.final
         if self.health.bad and final.height:
             times = final["time"].to_physical()
             self.segments.distrust(int(times[0]), int(times[-1]) + 1)
@@ -173,11 +178,13 @@ class Watch:
             watcher.latest.suspects[0],
         )  # fmt: skip
         if alarm is not None:
+            self._saved_at = 0
             if not alarm.again:
                 began = [one.began for one in alarm.suspects[:1]]
                 self.alarmed = min([*began, segment.start])
             yield alarm
-        self.save()
+        if self._clock - self._saved_at > SAVED_S * SECOND_NS:
+            self.save()
 
     def finish(self, clock: int) -> Iterator[Event]:
         """All that came is final, once the source is closed."""
@@ -187,6 +194,7 @@ class Watch:
         yield from self._look(end=True)
         if self.kept_rows is not None:
             self.kept_rows.flush()
+        self.save()
 
     def keep_voyage(self, store: Store, last: bool) -> str:
         """Where an alarm has stood for KEEP_S, or the watch ends with one: the rows since the
@@ -224,11 +232,13 @@ class Watch:
         facts = {
             "run": self.calibration.identity, "source": self.source.name,
             "place": self.source.place(), "begin": begin,
-            "anchor": self.rows.anchor, "datum": self.rows.datum,
+            "alarmed": self.alarmed, "done": self.rows.done, "anchor": self.rows.anchor,
+            "datum": self.rows.datum,
         } | evidence_file.facts(self.watcher)  # fmt: skip
         if self.kept_rows is not None:
             self.kept_rows.flush_if_old()
         kept.save(self.out, Saved(facts, evidence_file.arrays(self.watcher)))
+        self._saved_at = self._clock
 
     def resume(self, saved: Saved) -> bool:
         """Go on from there; False where it is of another run or source, and nothing is taken."""
@@ -242,6 +252,8 @@ class Watch:
         begin = int(facts.get("begin") or 0)
         if self.segments is not None:
             self.segments.begin = begin
+        self.resume_after = int(facts.get("done") or 0)
+        self.alarmed = None if facts.get("alarmed") is None else int(facts["alarmed"])
         if facts.get("anchor"):
             self.rows.anchor = int(facts["anchor"])
             datum = facts.get("datum")

@@ -78,10 +78,11 @@ def test_rows_are_those_of_ingest_afterwards(tmp_path, log):
     assert live.height == whole.height == live["time"].n_unique()
     assert (whole["quality"] != 0).any()  # the gap is among the rows that are compared
     assert differing(whole, live) <= DIFFER
-    # until they are final, rows are provisional, and behind the messages by a sample or two
-    for newest, rows in looks:
-        shown = rows.provisional["time"].to_physical()
-        assert shown.len() and newest - int(shown[-1]) < 300_000_000
+    # until they are final, rows are provisional, and behind the messages by a sample or two; where
+    # a channel has just fallen silent they wait a second for it
+    late = [newest - int(rows.provisional["time"].to_physical()[-1]) for newest, rows in looks]
+    assert np.median(late) < 300_000_000 and max(late) < 1_300_000_000
+    for _, rows in looks:
         assert rows.final.is_empty() or rows.final["time"][-1] < rows.provisional["time"][0]
 
 
