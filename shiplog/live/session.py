@@ -164,8 +164,12 @@ class Watch:
             self.segments.distrust(int(times[0]), int(times[-1]) + 1)
         if not final.height and not end:
             return
-        for segment in self.segments.add(final, end):
+        finished = self.segments.add(final, end)
+        for segment in finished:
             yield from self._segment(segment)
+        # of all of them or none: what has been cut is not cut again
+        if finished and self._clock - self._saved_at > SAVED_S * SECOND_NS:
+            self.save()
 
     def _segment(self, segment: Segment) -> Iterator[Event]:
         watcher = self.watcher
@@ -183,8 +187,6 @@ class Watch:
                 began = [one.began for one in alarm.suspects[:1]]
                 self.alarmed = min([*began, segment.start])
             yield alarm
-        if self._clock - self._saved_at > SAVED_S * SECOND_NS:
-            self.save()
 
     def finish(self, clock: int) -> Iterator[Event]:
         """All that came is final, once the source is closed."""
