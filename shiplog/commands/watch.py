@@ -106,7 +106,7 @@ def _prepared(
         return Watch(run, opened, out=out)
     found = calibration.calibrated(campaign)
     told.fact(*summary.begun(found, per_day))
-    return Watch(run, opened, campaign, found, found.watcher(per_day), out)
+    return Watch(run, opened, campaign.without_segments(), found, found.watcher(per_day), out)
 
 
 def _propose(watch: Watch, store: Store, told: Told, run_path: Path, last: bool = False) -> None:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 
 from shiplog.logs.health.health_report import Finding
 from shiplog.nomenclature.units import SECOND_NS
+from shiplog.voyages.rows.fault_detection import FROZEN_S
 
 SILENT_S = 2.0
 MOST_MISSED = 8.0  # periods without a sample
@@ -94,10 +95,8 @@ class Health:
 
         since_s   s into these messages, from which a finding is of now
         """
-        lasting = {
-            f.channel: f for f in findings
-            if f.kind in CHANNEL_FAULTS and (f.end_s is None or f.end_s >= since_s)
-        }  # fmt: skip
+        lasting = {f.channel: f for f in findings if _is_fault(f)
+                   and (f.end_s is None or f.end_s >= since_s)}  # fmt: skip
         found = []
         for channel, finding in lasting.items():
             found += self._turn("fault", channel, True, time, _of_now(finding.sentence), "")
@@ -125,6 +124,13 @@ class Health:
             del self.now[key]
             return [Notice(time, what, channel, right, over=True)]
         return []
+
+
+def _is_fault(finding: Finding) -> bool:
+    """Not a value that repeats for a moment: such rows are marked, and good enough."""
+    if finding.kind != "held":
+        return finding.kind in CHANNEL_FAULTS
+    return finding.unit == "s" and (finding.value or 0.0) >= FROZEN_S
 
 
 def _of_now(sentence: str) -> str:

@@ -43,6 +43,10 @@ class Nominal:
     def grid(self) -> SegmentGrid:
         return segments.grid(self.record)
 
+    def without_segments(self) -> Nominal:
+        """What segments of a watch need: not those of the campaign."""
+        return replace(self, campaign=self.campaign.without_nominal())
+
     @property
     def timescale(self) -> Timescale:
         return self.record.timescale

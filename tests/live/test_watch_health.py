@@ -13,6 +13,7 @@ from shiplog.live.health import Health, Heard
 from shiplog.live.sources import opened
 from shiplog.live.sources.socket_lines import AGAIN_S, SocketLines
 from shiplog.live.sources.text_file import TextFile
+from shiplog.logs.health.health_report import Finding
 from shiplog.nomenclature.units import SECOND_NS
 
 NOON = 1_780_000_000 * SECOND_NS
@@ -51,6 +52,19 @@ def test_a_silent_channel_is_said_once_and_so_is_its_return():
     assert health.bad == ["yaw_rate"]
     back = {name: Heard(last + 5 * SECOND_NS, one.period_s) for name, one in heard.items()}
     (notice,) = health.channels(back, last + 5 * SECOND_NS)
+    assert notice.over and health.bad == []
+
+
+def test_a_value_that_repeats_for_a_moment_is_no_fault():
+    def held(seconds: float, unit: str = "s") -> Finding:
+        return Finding("held", "position", f"position repeats for {seconds:.1f} s from 1.0 s.",
+                       1.0, 1.0 + seconds, seconds, unit=unit)  # fmt: skip
+
+    health = Health()
+    assert health.faults([held(0.8), held(40.0, "times")], 0.0, NOON) == []
+    (notice,) = health.faults([held(4.0)], 0.0, NOON)
+    assert notice.sentence == "position repeats." and health.bad == ["position"]
+    (notice,) = health.faults([held(4.0)], 10.0, NOON)  # it ended before what is now
     assert notice.over and health.bad == []
 
 
