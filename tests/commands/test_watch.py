@@ -96,6 +96,7 @@ def headings(first: int, seconds: int) -> pl.DataFrame:
     })  # fmt: skip
 
 
+@pytest.mark.long
 def test_a_source_without_a_channel_is_told_and_watched_on(published):
     run = load_model.load(published[0])
     looks = [Arrived({"/gyro": headings(DAY + n * 10 * 10**9, 10)}, topics=frozenset({"/gyro"}))
@@ -109,6 +110,7 @@ def test_a_source_without_a_channel_is_told_and_watched_on(published):
     assert any("given is silent" in getattr(e, "sentence", "") for e in [*events, *quiet])
 
 
+@pytest.mark.long
 def test_a_watch_ends_when_nothing_came_for_as_long_as_was_said(published, store, logs, tmp_path):
     """The clock is the test's: it goes on by a second with each wait."""
     path = tmp_path / "half.mcap"

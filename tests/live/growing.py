@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import io
 from pathlib import Path
 
@@ -25,9 +26,11 @@ def written(name: str, first_s: float, last_s: float, chunk: int = 4096) -> byte
             writer.add_metadata(record.name, record.metadata)
         begin = reader.get_summary().statistics.message_start_time
         since, until = (begin + round(s * SECOND) for s in (first_s, last_s))
-        for schema, channel, message in reader.iter_messages():
-            if not since <= message.log_time < until:
-                continue
+        known = inspect.signature(reader.iter_messages).parameters
+        names = ("starting_at", "ending_before")  # of mcap 1.4; earlier ones have others
+        names = names if names[0] in known else ("start_time", "end_time")
+        between = dict(zip(names, (since, until), strict=True))
+        for schema, channel, message in reader.iter_messages(**between):
             if channel.id not in channels:
                 if schema.id not in schemas:
                     schemas[schema.id] = writer.register_schema(

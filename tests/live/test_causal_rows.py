@@ -86,6 +86,7 @@ def test_rows_are_those_of_ingest_afterwards(tmp_path, log):
         assert rows.final.is_empty() or rows.final["time"][-1] < rows.provisional["time"][0]
 
 
+@pytest.mark.long
 def test_a_row_is_revised_when_a_rule_hears_of_it(tmp_path, log):
     """A sensor that begins to repeat itself is known to only after seconds: rows that were good
     when they were shown are marked, and counted as revised."""
@@ -156,6 +157,7 @@ def test_bytes_that_are_no_record_end_the_file_in_words(tmp_path, log):
     assert source.look(0).notes
 
 
+@pytest.mark.long
 def test_a_rotated_folder_is_one_voyage(tmp_path, log):
     folder = tmp_path / "recorder"
     folder.mkdir()

@@ -159,6 +159,7 @@ def test_what_is_damaged_or_of_another_model_is_no_state(tmp_path):
     assert not evidence_file.restore(watching(6.0), {"evidence_total": np.zeros((2, 2))}, {})
 
 
+@pytest.mark.long
 def test_memory_is_bounded():
     evidence = ChangeEvidence(WIDTHS, CAUSES)
     H, sizes = sailed(None, 0, count=PART), []

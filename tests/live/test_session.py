@@ -79,6 +79,7 @@ def done(events) -> list[SegmentDone]:
     return [event for event in events if isinstance(event, SegmentDone)]
 
 
+@pytest.mark.long
 def test_a_killed_watch_goes_on_as_if_it_had_not_been(tmp_path, content):
     path = tmp_path / "voyage.mcap"
     path.write_bytes(content)
@@ -105,6 +106,7 @@ def test_a_killed_watch_goes_on_as_if_it_had_not_been(tmp_path, content):
     assert tables is not None and tables["time"].n_unique() == tables.height
 
 
+@pytest.mark.long
 def test_a_state_of_another_run_is_not_taken(tmp_path, content):
     path = tmp_path / "voyage.mcap"
     path.write_bytes(content)
@@ -119,6 +121,7 @@ def test_a_state_of_another_run_is_not_taken(tmp_path, content):
     assert other.watcher is not None and other.watcher.ends == []
 
 
+@pytest.mark.long
 def test_no_segment_counts_while_a_channel_is_silent(tmp_path, content):
     """Health comes first: the gyro's yaw rate stops, and no evidence is made of what follows."""
     path = tmp_path / "voyage.mcap"
