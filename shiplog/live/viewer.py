@@ -11,6 +11,7 @@ import logging
 import tempfile
 import webbrowser
 from typing import IO
+from urllib.parse import quote
 
 import numpy as np
 import rerun as rr
@@ -119,7 +120,7 @@ def opened(title: str, web: bool) -> LiveView:
     except (TimeoutError, RuntimeError) as error:
         raise native.not_started(output) from error
     if web:
-        url = f"http://{native.HOST}:{page}/?url={address}"
+        url = f"http://{native.HOST}:{page}/?url={quote(address, safe=':/')}"
         log.warning("the watch is shown at %s", url)
         webbrowser.open(url)
     return LiveView(recording, title)
