@@ -97,6 +97,12 @@ class Watcher:
     def _empty(self) -> ChangeEvidence:
         return ChangeEvidence(self.directions.widths, places(self.directions.causes))
 
+    def begin_voyage(self) -> None:
+        """Another voyage differs from the one before as voyages do; an alarm that stands stays."""
+        self.evidence.restart()
+        self.alert.restart()
+        self.ends = []
+
     @property
     def stands(self) -> bool:
         """Whether an alarm is on."""

@@ -23,7 +23,7 @@ from shiplog.live.events import Event, RowsCame, SegmentDone
 from shiplog.live.finished_segments import FinishedSegments, Segment
 from shiplog.live.health import Health, Notice
 from shiplog.live.kept import KeptRows, Saved
-from shiplog.live.messages import Inflow, Window
+from shiplog.live.messages import Frames, Inflow, Window
 from shiplog.live.nominal import Nominal
 from shiplog.live.sources.base import Source
 from shiplog.nomenclature.units import SECOND_NS
@@ -77,7 +77,7 @@ class Watch:
         if not waiting:  # else what came before is dealt with first
             yield from self._arrive(clock)
         if self.inflow:
-            self._take(self.inflow.take(SLICE_S))
+            yield from self._take(self.inflow.take(SLICE_S))
             yield from self._look(end=False)
         elif self.ended:
             yield from self._look(end=True)
@@ -115,11 +115,11 @@ class Watch:
         if newest:
             yield from self.health.clock(newest, clock, self.source.live)
 
-    def _take(self, frames) -> None:
+    def _take(self, frames: Frames) -> Iterator[Event]:
         oldest = min((int(f["log_time"].min() or 0) for f in frames.values() if f.height),
                      default=0)  # fmt: skip
         if self.window.newest and oldest - self.window.newest > BREAK_S * SECOND_NS:
-            list(self._begin_anew())
+            yield from self._begin_anew()
         self.window.add(frames)
 
     def _look(self, end: bool) -> Iterator[Event]:
@@ -191,7 +191,7 @@ class Watch:
     def finish(self, clock: int) -> Iterator[Event]:
         """All that came is final, once the source is closed."""
         while self.inflow:
-            self._take(self.inflow.take(SLICE_S))
+            yield from self._take(self.inflow.take(SLICE_S))
             yield from self._look(end=False)
         yield from self._look(end=True)
         if self.kept_rows is not None:
@@ -222,6 +222,8 @@ class Watch:
         self.errors = ErrorNow(self.run)
         if self.nominal is not None:
             self.segments = FinishedSegments(self.nominal)
+        if self.watcher is not None:
+            self.watcher.begin_voyage()
         self.resume_after = 0
 
     # --- to go on after the process has ended -------------------------------------------------

@@ -7,9 +7,11 @@ likelihood is tested in `test_change_evidence`.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import polars as pl
 import pytest
 from growing import written
 
@@ -144,3 +146,29 @@ def test_no_segment_counts_while_a_channel_is_silent(tmp_path, content):
     assert any("wind is silent" in s for s in said)
     last = max(e.time for e in events if isinstance(e, RowsCame))
     assert done(events) and last - done(events)[-1].time > 20 * 10**9
+
+
+@pytest.mark.long
+def test_after_a_long_pause_another_voyage_begins(tmp_path, content):
+    """Twenty minutes without a message: the rows before them are final, none bridges the pause."""
+    path = tmp_path / "voyage.mcap"
+    path.write_bytes(content)
+    made = watch(path, None)
+    look, pause = made.source.look, 1200 * 10**9
+
+    def later(clock):
+        arrived = look(clock)
+        frames = {}
+        for topic, frame in arrived.frames.items():
+            half = pl.col("log_time") > int(frame["log_time"][frame.height // 2])
+            moved = [pl.when(half).then(pl.col(n) + pause).otherwise(pl.col(n)).alias(n)
+                     for n in ("log_time", "publish_time", "stamp")]  # fmt: skip
+            frames[topic] = frame.with_columns(moved)
+        return replace(arrived, frames=frames)
+
+    made.source.look = later
+    events = [*sailed(made, 10), *made.finish(CLOCK)]
+    rows = pl.concat([e.final for e in events if isinstance(e, RowsCame) and e.final.height])
+    steps = rows["time"].diff().drop_nulls().dt.total_milliseconds()
+    assert sorted(set(steps.to_list()))[:1] == [100] and (steps > 1_000_000).sum() == 1
+    assert rows.height > 500 and rows["x0"].null_count() < 20
