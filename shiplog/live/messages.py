@@ -80,6 +80,12 @@ class Window:
                     del self.parts[topic]
 
 
+def oldest(frames: Frames) -> int:
+    """The earliest log time of them [ns]; 0 where there is no message."""
+    times = [int(f["log_time"].min() or 0) for f in frames.values() if f.height]  # type: ignore[arg-type]
+    return min(times, default=0)
+
+
 class Decoding:
     """Messages of one log, of the wanted fields, as frames."""
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from shiplog.exceptions import ShiplogError, listed
-from shiplog.live import evidence_file, kept, kept_voyage
+from shiplog.live import evidence_file, kept, kept_voyage, messages
 from shiplog.live.alarm import Alarm, Watcher
 from shiplog.live.calibration import Calibration
 from shiplog.live.causal_rows import CausalRows, Rows
@@ -116,8 +116,7 @@ class Watch:
             yield from self.health.clock(newest, clock, self.source.live)
 
     def _take(self, frames: Frames) -> Iterator[Event]:
-        oldest = min((int(f["log_time"].min() or 0) for f in frames.values() if f.height),
-                     default=0)  # fmt: skip
+        oldest = messages.oldest(frames)
         if self.window.newest and oldest - self.window.newest > BREAK_S * SECOND_NS:
             yield from self._begin_anew()
         self.window.add(frames)
