@@ -16,7 +16,7 @@ import pytest
 from growing import written
 
 from shiplog.diagnosis.linear import segments
-from shiplog.live import finished_segments, kept
+from shiplog.live import finished_segments, kept, session
 from shiplog.live.alarm import Thresholds, Watcher
 from shiplog.live.events import RowsCame, SegmentDone
 from shiplog.live.segment_products import Directions
@@ -50,6 +50,8 @@ def products_of_rows(monkeypatch):
         return found
 
     monkeypatch.setattr(finished_segments.segment_products, "grams", grams)
+    nothing = SimpleNamespace(look=lambda final, provisional: [])
+    monkeypatch.setattr(session, "ErrorNow", lambda run: nothing)
 
 
 def watch(path, out, at=None) -> Watch:
@@ -67,9 +69,7 @@ def watch(path, out, at=None) -> Watch:
     )
     watcher = Watcher(directions, thresholds, 1.0)
     it = SimpleNamespace(identity="it")
-    made = Watch(run, McapFile(path, WANTED, at), nominal, it, watcher, out)
-    made.errors = SimpleNamespace(look=lambda final, provisional: [])
-    return made
+    return Watch(run, McapFile(path, WANTED, at), nominal, it, watcher, out)
 
 
 def sailed(made: Watch, steps: int) -> list:
