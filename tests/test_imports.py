@@ -27,6 +27,7 @@ ROWS = {
     "planning": "what to sail next, and what it would show",
     "report": "verdict, pages, tables, viewer",
     "export": "a run in files of other programs, compared with itself",
+    "live": "a model next to its ship: causal rows, error, evidence, alarm",
     "commands": "what each command does, and its answer",
     "cli": "arguments and printing",
 }
@@ -49,8 +50,8 @@ ROOMS = {
 LEVEL = {name: level for level, name in enumerate(ROWS)}
 SOURCES = sorted((ROOT / "shiplog").rglob("*.py"))
 ONLY = {  # a library, and the packages and modules that may import it
-    "mcap": {"logs"}, "mcap_protobuf": {"logs"}, "mcap_ros2": {"logs"}, "pynmea2": {"logs"},
-    "rosbags": {"logs"}, "rerun": {"logs", "report", "export"}, "ray": {"training"},
+    "mcap": {"logs", "live"}, "mcap_protobuf": {"logs"}, "mcap_ros2": {"logs"}, "pynmea2": {"logs"},
+    "rosbags": {"logs"}, "rerun": {"logs", "report", "export", "live"}, "ray": {"training"},
     "matplotlib": {"report"}, "jinja2": {"report"}, "typer": {"cli"}, "pickle": set(),
     "torch": {"training", "shiplog.models.feedforward"}, "pymavlink": {"logs"},
     "fmpy": {"export", "foreign"}, "onnx": {"export"}, "onnxruntime": {"export"},

@@ -26,6 +26,7 @@ from shiplog.cli import (
     train,
     trend,
     voyages,
+    watch,
 )
 
 COMMANDS = (
@@ -41,6 +42,7 @@ COMMANDS = (
     compare.compare,
     diagnose.diagnose,
     trend.trend,
+    watch.watch,
     simulate.simulate,
     manoeuvres.manoeuvres,
     export.export,

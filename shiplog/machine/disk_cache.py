@@ -15,6 +15,7 @@ FOLDERS = {  # folder: what is kept in it
     "kernels": "machine code of ships' equations",
     "traced": "traced equations of ships that have no kernel",
     "settled": "posteriors of nominal campaigns",
+    "watched": "thresholds of alarms",
     "faults": "traces of unexpected faults",
 }
 

@@ -139,6 +139,13 @@ def start(arguments: list[str], output: IO[bytes], supervised: bool = False) -> 
     return child.program(command, output, _environment(), supervised)
 
 
+def not_started(output: IO[bytes]) -> ShiplogError:
+    """The error of a viewer that did not start, with its last words."""
+    return ShiplogError(
+        f"The viewer did not start: {child.last_words(output)}", hint=WITHOUT_A_WINDOW
+    )
+
+
 def free_port(wanted: int = 0) -> int:
     """`wanted` if nobody listens there, or one the system gives."""
     for port in (wanted, 0):

@@ -1,0 +1,132 @@
+"""Products H_s of every segment of a leg, kept in a file: the watch is then tried on them at will.
+
+    python -m pipelines.experiments.watching.segments_kept SHIPS OUT --legs 20 [--first 0]
+    python -m pipelines.experiments.watching.segments_kept SHIPS OUT --half-way 60
+    python -m pipelines.experiments.watching.segments_kept SHIPS OUT --calibrate
+
+SHIPS holds a folder a ship with `store` and `base`, as `hidden_effects` makes them.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from pipelines.experiments.watching import sailing
+from shiplog.diagnosis.linear import segments
+from shiplog.live import calibration, nominal, segment_products
+from shiplog.live.alarm import places
+from shiplog.live.alarm_threshold import peaks_of
+from shiplog.live.nominal import Nominal
+from shiplog.machine import files
+from shiplog.training.runs import load_model
+from shiplog.voyages.rows.recording import Record
+from shiplog.voyages.store.store import Store
+
+
+def campaign_of(folder: Path) -> Nominal:
+    found = nominal.nominal(load_model.load(folder / "base"), Store(folder / "store"))
+    assert found is not None
+    return found
+
+
+def timed_products(
+    of: Nominal, record: Record, directions: segment_products.Directions
+) -> tuple[np.ndarray, np.ndarray]:
+    """The ends of a record's segments [S], s into it, and H_s [S, N, N]."""
+    ends = segments.begins(nominal.as_campaign(record, of.timescale)) + of.grid.rows
+    return record.time[ends], products(of, record, directions)
+
+
+def products(of: Nominal, record: Record, directions: segment_products.Directions) -> np.ndarray:
+    """H_s [S, N, N] of a record's segments."""
+    record = nominal.as_campaign(record, of.timescale)
+    rows = segments.begins(record)
+    grams = segment_products.grams(of.campaign.reference, of.grid, record, rows)
+    return np.stack([directions.products(one) for one in grams])
+
+
+def keep_calibrations(there: dict[sailing.Ship, Nominal], maps: dict, out: Path) -> None:
+    """What the nominal campaign of each ship says of its alarm, as `shiplog watch` learns it."""
+    for ship, of in there.items():
+        totals, squares = calibration.watched_voyages(of)
+        median = float(np.median(squares))
+        peaks = np.concatenate([peaks_of(one) for one in totals if one])
+        logs = peaks_of(np.log(np.array(squares) / median).tolist())
+        causes = {f"cause {label}": at for label, at in places(maps[ship].causes).items()}
+        np.savez(
+            out / f"calibration-{ship.name}.npz", peaks=peaks, logs=logs, median=median,
+            segments=len(squares), segment_s=of.grid.seconds, widths=maps[ship].widths,
+            counts=maps[ship].counts, **causes,
+        )  # fmt: skip
+
+
+def half_ways(there: dict[sailing.Ship, Nominal], count: int) -> list[tuple[sailing.Ship, str]]:
+    """Ship and cause of so many voyages, drawn of the causes of its bank."""
+    rng = np.random.default_rng(68)
+    found = []
+    for number in range(count):
+        ship = sailing.FIVE[number % len(sailing.FIVE)]
+        offered = sailing.offered(ship)
+        if ship in there:
+            known = {c.name for c in there[ship].campaign.reference.model.causes}
+            offered = [name for name in offered if name in known]
+        found.append((ship, str(rng.choice(offered))))
+    return found
+
+
+def keep_half_ways(there: dict[sailing.Ship, Nominal], maps: dict, out: Path, count: int) -> None:
+    """H_s of each such voyage, the ends of its segments, and what was hidden from when on."""
+    rng = np.random.default_rng(69)
+    for number, (ship, cause) in enumerate(half_ways(there, count)):
+        size = float(0.25 ** rng.uniform(0.0, 1.0))  # of the realistic size, 0.25 to 1
+        path = out / f"half-{number:03d}.npz"
+        if path.exists() or ship not in there:
+            continue
+        of = there[ship]
+        seconds = sailing.LEG_S * max(1.0, of.grid.seconds / 30.0)
+        series, begins = sailing.half_way(ship, 5000 + number, cause, size, seconds)
+        record = sailing.record_of(series, of.record.profile)
+        times, H = timed_products(of, record, maps[ship])
+        with files.whole(path) as partial, partial.open("wb") as stream:
+            np.savez(
+                stream, H=H.astype(np.float32), times=times, begins=begins, size=size,
+                cause=np.array(cause), ship=np.array(ship.name),
+            )  # fmt: skip
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("ships", type=Path)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--legs", type=int, default=20)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--half-way", type=int, default=0)
+    parser.add_argument("--calibrate", action="store_true")
+    parser.add_argument("--only", nargs="*", default=())
+    given = parser.parse_args()
+    given.out.mkdir(parents=True, exist_ok=True)
+    ships = [s for s in sailing.FIVE if not given.only or s.name in given.only]
+    there = {s: campaign_of(given.ships / s.name) for s in ships if (given.ships / s.name).exists()}
+    maps = {s: segment_products.directions(of.campaign) for s, of in there.items()}
+    if given.calibrate:
+        keep_calibrations(there, maps, given.out)
+        return
+    if given.half_way:
+        keep_half_ways(there, maps, given.out, given.half_way)
+        return
+    for number in range(given.first, given.first + given.legs):
+        for ship, of in there.items():
+            path = given.out / f"{ship.name}-{number:04d}.npy"
+            if path.exists():
+                continue
+            profile = of.record.profile
+            record = sailing.record_of(sailing.leg(ship, number), profile)
+            with files.whole(path) as partial, partial.open("wb") as stream:
+                np.save(stream, products(of, record, maps[ship]).astype(np.float32))
+
+
+if __name__ == "__main__":
+    main()
