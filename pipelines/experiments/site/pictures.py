@@ -123,8 +123,8 @@ HOUSE = (  # package, what it holds; from below, which is what is imported by al
      ("simulation", "rollouts, L, coverage"), ("training", "recipes, runs")),
     (("diagnosis", "segments to verdict"), ("manoeuvres", "found, measured, sailed"),
      ("planning", "what to sail next"), ("report", "page, figures, viewer")),
-    (("export", "other programs' files"), ("commands", "steps of each command"),
-     ("cli", "arguments, printing")),
+    (("export", "other programs' files"), ("live", "next to the ship"),
+     ("commands", "steps of each command"), ("cli", "arguments, printing")),
 )  # fmt: skip
 
 
