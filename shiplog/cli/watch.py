@@ -52,7 +52,7 @@ def watch(
         typer.Option("--json", metavar="PATH|-", help="Append a line of JSON each; - is stdout."),
     ] = None,
 ) -> None:
-    """The model beside the ship while it sails: its error now, an alarm, a suspicion.
+    """The model next to a ship that sails: error, alarm, suspicion.
 
     The error is shown in metres and degrees with its band. An alarm means that the ship is no
     longer the one that the model was identified from; it names a suspect, and `diagnose` gives the

@@ -48,6 +48,7 @@ from shiplog.report.page.diagnosis import source as sources
 from shiplog.report.page.diagnosis.source import PROVENANCE, VERDICT
 from shiplog.report.result import Shown
 from shiplog.ship_profile.profile import Profile
+from shiplog.simulation.extended_simulator import ExtendedSimulator
 from shiplog.training.runs import extension_file, load_model
 from shiplog.training.runs.load_model import Run
 from shiplog.training.runs.provenance import portable, provenance
@@ -150,8 +151,8 @@ def _run(
         log.info("no named cause can be part of a model: %s is not written", extend)
         return done
     # last: once it is there, the same command is refused
-    path = extension_file.extend(run, extend, done.after, cause_files)
-    return replace(done, extended=load_model.load(path, causes, simulators))
+    extended = _extended(run, done.after, extend, cause_files, causes, simulators)
+    return replace(done, extended=extended)
 
 
 @dataclass(frozen=True)
@@ -309,6 +310,14 @@ def _save(
     portable_places = {key: portable([str(path)])[0] for key, path in places.items()}
     facts = provenance(hashes, began) | portable_places
     files.write_json(done.folder / PROVENANCE, facts)
+
+
+def _extended(
+    run: Run, after: ExtendedSimulator, out: Path, own: Sequence[Path], causes: Sequence[Cause],
+    simulators: Sequence[str],
+) -> Run:  # fmt: skip
+    """The model with the named causes, as the run `out`."""
+    return load_model.load(extension_file.extend(run, out, after, own), causes, simulators)
 
 
 def _drawn(done: Diagnosis, run: Run, seconds: voyage_tables.Seconds) -> Diagnosis:

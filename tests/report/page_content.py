@@ -62,11 +62,16 @@ def pictures(voyages=(HOSTILE,), windows=1, latitude=34.8):
         "drift": [0.0, 0.2, 0.0], "yaw_rate": [0.0, 0.02, 0.0], "wind_speed": [5.0, 5.0, 4.0],
         "wind_from": [np.pi / 2, np.pi / 2, 0.0],
     })  # fmt: skip
+    at = 100.0 * windows * np.arange(len(voyages))
+    acting = pl.DataFrame({
+        "cause": ["current"] * len(voyages), "voyage": list(voyages), "begin": at,
+        "end": at + 100.0 * windows, "probability": np.full(len(voyages), 0.9),
+    })  # fmt: skip
     return typed(PictureData(
         title="by hand", length=LENGTH, breadth=0.5, models={BEFORE: "mmg", AFTER: "mmg, with it"},
         named=("current",), current=(0.5, np.pi), voyages=rows, measured=pl.concat(measured),
         tracks=pl.concat(tracks), errors=pl.DataFrame(errors), residual=pl.concat(residual),
-        conditions=conditions,
+        conditions=conditions, acting=acting,
     ))  # fmt: skip
 
 
