@@ -16,7 +16,6 @@ from shiplog.diagnosis.linear.parameter_layout import HELD_INFORMATION
 from shiplog.diagnosis.noise import bounds
 from shiplog.diagnosis.noise.campaign_parts import robust_weights
 from shiplog.diagnosis.noise.remainder import CHANGE_SIZES, Remainder, noise_prior
-from shiplog.diagnosis.nominal.nominal_fit import LEAST_SIZE
 from shiplog.diagnosis.nominal.voyage_effects import inverse_and_volume
 from shiplog.diagnosis.trial.fitted import Estimate, ExpectedEvidence, Level, Point
 from shiplog.diagnosis.trial.trial import Numbers, Trial
@@ -29,8 +28,6 @@ LONGEST = 18  # steps at once, at most: four times as much noise, or a quarter
 MOST_MOVES = 8  # of three levels to others, at most
 LITTLE_NATS = 1.0  # gain of a step, too small to decide between hypotheses
 MOST_PATHS = 8  # of the model as it stands, one closer to the measurement than the other, at most
-SIZE_STEPS, SIZE_NATS = 12, 0.05  # of the sizes of a discrepancy, at most; gain that ends them
-LEAST_DETERMINED = 1e-3  # of a family's weights: with fewer its size is that of no discrepancy
 NO_CHANGE_OF_NOISE = Remainder()
 
 
@@ -93,11 +90,6 @@ def solve(
         A = P⁻¹ + c Hᵀ R⁻¹ H,   b = P⁻¹ μ + c Hᵀ R⁻¹ r
         log Z = -½ (c rᵀ R⁻¹ r + μᵀ P⁻¹ μ - bᵀ A⁻¹ b + log|A| - log|P⁻¹| + c log|R|)
 
-    Where no nominal campaign shows the sizes s_f of the discrepancy's families, Z is the greatest
-    over them (type II maximum likelihood), by MacKay's steps (1992) from those without any cause:
-
-        s_f² ← |m_f|² / (n_f - s_f⁻² tr V_f),   m = A⁻¹ b, V = A⁻¹, of the n_f weights of the family
-
     G      [1 + C, 1 + C]  [r J]ᵀ R⁻¹ [r J] over all C columns of the trial; H are N of them
     log_R  log|R|
     noise  λ, of which G and log|R| are
@@ -108,22 +100,12 @@ def solve(
     chosen = np.append(0, 1 + columns_of(trial, included, remainder))
     G = (c * G)[np.ix_(chosen, chosen)]
     prior = _prior(trial, point, included, remainder)
-
-    def posterior(prior: _Prior) -> Level:
-        A, b = G[1:, 1:] + prior.P_inv, G[1:, 0] + prior.P_inv_mu
-        A_inv, log_A = inverse_and_volume(A)
-        mean = A_inv @ b
-        square = G[0, 0] + prior.square - b @ mean
-        log_S = log_A - prior.log_P_inv
-        return Level(noise, G, A_inv, mean, -0.5 * float(square + log_S + c * log_R))
-
-    best = posterior(prior)
-    for _ in range(SIZE_STEPS if trial.reference.estimated else 0):
-        prior = prior.with_sizes(best, trial.reference.estimated)
-        last, best = best, max(best, posterior(prior), key=lambda one: one.value)
-        if best.value - last.value < SIZE_NATS:
-            break
-    return best
+    A, b = G[1:, 1:] + prior.P_inv, G[1:, 0] + prior.P_inv_mu
+    A_inv, log_A = inverse_and_volume(A)
+    mean = A_inv @ b
+    square = G[0, 0] + prior.square - b @ mean
+    log_S = log_A - prior.log_P_inv
+    return Level(noise, G, A_inv, mean, -0.5 * float(square + log_S + c * log_R))
 
 
 @dataclass(frozen=True)
@@ -140,18 +122,6 @@ class _Prior:
     P_inv_mu: np.ndarray
     square: float
     log_P_inv: float
-
-    def with_sizes(self, level: Level, families: Sequence[np.ndarray]) -> _Prior:
-        """With the next sizes of the families' weights, which are zero on average."""
-        P_inv, log_P_inv = self.P_inv.copy(), self.log_P_inv
-        for of in families:
-            n, before = len(of), float(P_inv[of[0], of[0]])
-            determined = n - before * float(np.diagonal(level.covariance)[of].sum())
-            square = float(level.mean[of] @ level.mean[of])
-            size = math.sqrt(square / max(determined, LEAST_DETERMINED))
-            P_inv[of, of] = max(size, LEAST_SIZE) ** -2.0
-            log_P_inv += n * math.log(float(P_inv[of[0], of[0]]) / before)
-        return replace(self, P_inv=P_inv, log_P_inv=log_P_inv)
 
 
 def _prior(

@@ -212,8 +212,6 @@ def assume_campaign(
     nominal size.
 
     given    coefficients that nobody fitted, held near their values; else a fit to these voyages.
-             Of a given model every hypothesis estimates the sizes of the discrepancy for itself:
-             those that are estimated without a cause take in what the cause explains
     inputs   a network that was trained on these voyages
     numbers  of causes that were found in these voyages: what they explain is no discrepancy
     """
@@ -235,7 +233,6 @@ def assume_campaign(
     made = replace(
         whole.reference, information=np.diag(K), pull=K * whole.reference.anchor,
         nominal=None, adapts=not given,
-        estimated=tuple(f.columns for f in whole.discrepancy.families) if given else (),
     )  # fmt: skip
     return replace(
         whole,

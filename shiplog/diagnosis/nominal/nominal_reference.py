@@ -51,8 +51,6 @@ class Reference:
     misfit       the error of its MMG as a function of the network's inputs
     counts       share of itself that a trial counts, as its voyages have errors of their own
     expected     [W] weights of the discrepancy that a path follows; none where None
-    estimated    columns of each family of the discrepancy whose size every hypothesis estimates
-                 for itself, because no nominal voyage shows it
     """
 
     model: Extended
@@ -70,7 +68,6 @@ class Reference:
     misfit: Misfit | None = None
     counts: float = 1.0
     expected: np.ndarray | None = None
-    estimated: tuple[np.ndarray, ...] = ()
 
     @cached_property
     def mean(self) -> np.ndarray:
