@@ -29,7 +29,7 @@ from shiplog.exceptions import RunError, UsageError
 from shiplog.voyages.contradictions import twins
 from shiplog.voyages.store.store import Store
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.nightly
 
 
 def test_a_current_is_named_and_sized(sea):
