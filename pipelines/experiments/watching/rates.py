@@ -157,7 +157,7 @@ def series(products: np.ndarray) -> np.ndarray:
 
 def peers() -> dict[str, tuple[Callable[[float], object], tuple[float, ...]]]:
     """Detectors of river, made by the number that sets how often they are wrong."""
-    from river import drift
+    from river import drift  # pyright: ignore[reportMissingImports]  # a peer
 
     return {
         "ADWIN": (lambda d: drift.ADWIN(delta=d, min_window_length=2, grace_period=4, clock=1),
@@ -206,7 +206,7 @@ def best_of_river(folder: Path, there: dict[str, Known], most: int) -> list[str]
 def of_ruptures(folder: Path, there: dict[str, Known], most: int) -> list[str]:
     """Whole voyages, cut by least squares (Pelt): found where a cut lies within three segments of
     the beginning; the penalty as the settings of river."""
-    import ruptures
+    import ruptures  # pyright: ignore[reportMissingImports]  # a peer
 
     def cuts(values: np.ndarray, penalty: float) -> list[int]:
         algorithm = ruptures.Pelt(model="l2", min_size=3, jump=1).fit(values)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -55,7 +56,9 @@ def keep_calibrations(there: dict[sailing.Ship, Nominal], maps: dict, out: Path)
         median = float(np.median(squares))
         peaks = np.concatenate([peaks_of(one) for one in totals if one])
         logs = peaks_of(np.log(np.array(squares) / median).tolist())
-        causes = {f"cause {label}": at for label, at in places(maps[ship].causes).items()}
+        causes: dict[str, Any] = {
+            f"cause {label}": at for label, at in places(maps[ship].causes).items()
+        }
         np.savez(
             out / f"calibration-{ship.name}.npz", peaks=peaks, logs=logs, median=median,
             segments=len(squares), segment_s=of.grid.seconds, widths=maps[ship].widths,
