@@ -274,8 +274,8 @@ def answer(ship: Ship, truth: Truth, number: int) -> dict[str, Any]:
     covariance = fit.estimate.covariance
     assert covariance is not None
     one = Named(cause, nats, 1.0, np.asarray(fit.estimate.numbers[label]), covariance)
-    told = stretch_information.of_cause(trial, fit, label)
-    found = onsets.onset(trial, told, one)
+    information = stretch_information.of_cause(trial, fit, label)
+    found = onsets.onset(trial, information, one)
     off = found.off
     return of | {
         "shown": True, "found": found.begin.elapsed_s, "low": found.begin.low,

@@ -65,14 +65,14 @@ def watch(
 
     with loading():
         from shiplog.cli import watch_output
-        from shiplog.commands.watch import Told, watch_command
+        from shiplog.commands.watch import Reporter, watch_command
     from shiplog.voyages.store.store import Store
 
     with watch_output.lines(json_to) as lines:
         drawn = watch_output.drawn(run, web) if view or web else None
-        told = Told(watch_output.text(json_to), lines, drawn)
+        reporter = Reporter(watch_output.text(json_to), lines, drawn)
         done = watch_command(
-            source, run, Store(store), out, told, per_day=false_alarms_per_day,
+            source, run, Store(store), out, reporter, per_day=false_alarms_per_day,
             stop_after_s=stop_after, anew=anew,
         )  # fmt: skip
-        told.fact(done.json, done.text)
+        reporter.fact(done.json, done.text)

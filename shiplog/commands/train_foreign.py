@@ -45,7 +45,7 @@ class Given:
     """What a user gives of a simulator.
 
     name       FILE.py, FILE.py:NAME, FILE.fmu or logs:/TOPIC
-    mapping    of an FMU; beside it where none is given
+    mapping    of an FMU; next to it where none is given
     logs       that hold the topic
     unchecked  whether a mapping may still say CHECK
     """

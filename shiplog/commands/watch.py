@@ -1,4 +1,4 @@
-"""A model beside its ship while it sails: a line an event, until the source ends."""
+"""A model next to its ship while it sails: a line an event, until the source ends."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Emit = Callable[[str], None]
 
 
 @dataclass
-class Told:
+class Reporter:
     """Where events go: a line of JSON each, or of text."""
 
     text: Emit
@@ -57,7 +57,7 @@ def watch_command(
     run_path: Path,
     store: Store,
     out: Path,
-    told: Told,
+    reporter: Reporter,
     *,
     per_day: float,
     stop_after_s: float | None = None,
@@ -74,16 +74,16 @@ def watch_command(
     saved = None if anew else kept.load(out)
     place = None if saved is None else saved.facts.get("place")
     opened = sources.opened(source, fields_read.wanted(run.profile, {}), place)
-    watch = _prepared(run, store, opened, out, per_day, told)
+    watch = _prepared(run, store, opened, out, per_day, reporter)
     if saved is not None and watch.resume(saved):
-        told.fact(*summary.resumed(watch))
+        reporter.fact(*summary.resumed(watch))
     pace = watch_pace.Pace(stop_after_s)
     try:
         while not watch.done and not pace.over(watch, now()):
             for event in watch.step(now()):
-                told.event(event)
+                reporter.event(event)
                 if isinstance(event, Alarm):
-                    _propose(watch, store, told, run_path)
+                    _propose(watch, store, reporter, run_path)
             if not watch.busy:
                 sleep(watch_pace.LOOK_S)
     except KeyboardInterrupt:
@@ -91,26 +91,28 @@ def watch_command(
     finally:
         opened.close()
     for event in watch.finish(now()):
-        told.event(event)
-    _propose(watch, store, told, run_path, last=True)
-    return summary.watched(watch, told.counts, source, run)
+        reporter.event(event)
+    _propose(watch, store, reporter, run_path, last=True)
+    return summary.watched(watch, reporter.counts, source, run)
 
 
 def _prepared(
-    run: Run, store: Store, opened: sources.Source, out: Path, per_day: float, told: Told
+    run: Run, store: Store, opened: sources.Source, out: Path, per_day: float, reporter: Reporter
 ) -> Watch:
     why = nominal.why_none(run, store)
     campaign = None if why else nominal.nominal(run, store)
     if campaign is None:
-        told.fact(*summary.without_alarm(why))
+        reporter.fact(*summary.without_alarm(why))
         return Watch(run, opened, out=out)
     found = calibration.calibrated(campaign)
-    told.fact(*summary.begun(found, per_day))
+    reporter.fact(*summary.begun(found, per_day))
     return Watch(run, opened, campaign.without_segments(), found, found.watcher(per_day), out)
 
 
-def _propose(watch: Watch, store: Store, told: Told, run_path: Path, last: bool = False) -> None:
+def _propose(
+    watch: Watch, store: Store, reporter: Reporter, run_path: Path, last: bool = False
+) -> None:
     """The kept rows as a voyage of the store, and the command that diagnoses it."""
     name = watch.keep_voyage(store, last)
     if name:
-        told.fact(*summary.proposed(name, run_path, store.path))
+        reporter.fact(*summary.proposed(name, run_path, store.path))

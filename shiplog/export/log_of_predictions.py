@@ -1,4 +1,4 @@
-"""`--to mcap`: predictions of a voyage as the contract's topics, beside what was measured.
+"""`--to mcap`: predictions of a voyage as the contract's topics, next to what was measured.
 
 /sim/<run>/state   what the run predicts, beginning at the measured state of each window
 /ship/state        what was measured

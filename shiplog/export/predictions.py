@@ -1,4 +1,4 @@
-"""What a run predicts of voyages: its rollouts of their windows, beside what was measured.
+"""What a run predicts of voyages: its rollouts of their windows, next to what was measured.
 
 As `evaluate` and `compare` judge it: each window of the run's length begins at the measured state.
 """

@@ -34,9 +34,11 @@ class ExchangeFmu(Fmu):
 
     def __init__(self, path: Path, mapping: Mapping[str, Any]) -> None:
         super().__init__(path, mapping)
-        states = [one.variable.derivative for one in self.told.derivatives]
+        states = [one.variable.derivative for one in self.model_description.derivatives]
         names = [one.name for one in states]
-        self.derivatives = [one.variable.valueReference for one in self.told.derivatives]
+        self.derivatives = [
+            one.variable.valueReference for one in self.model_description.derivatives
+        ]
         self.references = [one.valueReference for one in states]
         self.count = len(states)
         outputs = {c: mapping["state"][c]["output"] for c in self.given}
@@ -50,7 +52,7 @@ class ExchangeFmu(Fmu):
         moving = [CHANNELS[i] for i in VELOCITIES]
         self.moving = [names.index(outputs[c]) for c in moving]
         self.z, self.f = ((ctypes.c_double * self.count)() for _ in range(2))
-        self.provides = bool(self.told.modelExchange.providesDirectionalDerivative)
+        self.provides = bool(self.model_description.modelExchange.providesDirectionalDerivative)
         self.first: np.ndarray | None = None
 
     # --- what the bridge asks ---
@@ -179,7 +181,7 @@ class ExchangeFmu(Fmu):
     def _kind(self) -> Any:
         from fmpy.fmi2 import FMU2Model
 
-        return FMU2Model, self.told.modelExchange.modelIdentifier
+        return FMU2Model, self.model_description.modelExchange.modelIdentifier
 
     def _initialise(self) -> None:
         super()._initialise()

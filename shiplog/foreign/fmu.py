@@ -83,14 +83,14 @@ class Fmu:
         fmpy = _library()
         self.folder = tempfile.mkdtemp(prefix="shiplog-fmu-")
         try:
-            self.told = fmpy.read_model_description(str(path), validate=False)
+            self.model_description = fmpy.read_model_description(str(path), validate=False)
             fmpy.extract(str(path), unzipdir=self.folder)
         except Exception as error:
             raise Refused(f"it cannot be opened: {_first(error)}") from error
         self.step, self.hold = float(mapping["step"]), bool(mapping["hold"])
-        inner = getattr(self.told.coSimulation, "fixedInternalStepSize", None)
+        inner = getattr(self.model_description.coSimulation, "fixedInternalStepSize", None)
         self.short = float(inner) if inner else min(SHORT, self.step)
-        by_name = {v.name: v for v in self.told.modelVariables}
+        by_name = {v.name: v for v in self.model_description.modelVariables}
         self.names = list(mapping["actuators"])
         state = mapping["state"]
         self.given = [c for c in CHANNELS if c in state]
@@ -111,11 +111,11 @@ class Fmu:
         self.starts = _References([by_name[name] for _, name, _ in begun])
         self.parameters = [(by_name[name], value) for name, value in mapping["parameters"].items()]
         self.clock = next(
-            (v for v in self.told.modelVariables
+            (v for v in self.model_description.modelVariables
              if v.causality == "output" and v.name.lower() == "time"), None,
         )  # fmt: skip
         self.own_time = _References([] if self.clock is None else [self.clock])
-        self.version = int(self.told.fmiVersion.split(".")[0])
+        self.version = int(self.model_description.fmiVersion.split(".")[0])
         self.flags = [ctypes.byref(of()) for of in (*[ctypes.c_bool] * 3, ctypes.c_double)]
         self.instance: Any = None
         self.used = False
@@ -144,7 +144,8 @@ class Fmu:
             )
         return {
             "returns": "next state", "step": self.step, "layout": "row by row",
-            "library": f"FMI {self.told.fmiVersion}", "changes": False, "differentiated": False,
+            "library": f"FMI {self.model_description.fmiVersion}", "changes": False,
+            "differentiated": False,
         } | facts  # fmt: skip
 
     def _moved(self, rows: np.ndarray) -> bool:
@@ -291,8 +292,8 @@ class Fmu:
             if self.instance is None:
                 kind, identifier = self._kind()
                 self.instance = kind(
-                    guid=self.told.guid, unzipDirectory=self.folder, instanceName="shiplog",
-                    modelIdentifier=identifier,
+                    guid=self.model_description.guid, unzipDirectory=self.folder,
+                    instanceName="shiplog", modelIdentifier=identifier,
                 )  # fmt: skip
             self.instance.instantiate()
         except Exception as error:
@@ -304,7 +305,7 @@ class Fmu:
         from fmpy.fmi2 import FMU2Slave
         from fmpy.fmi3 import FMU3Slave
 
-        identifier = self.told.coSimulation.modelIdentifier
+        identifier = self.model_description.coSimulation.modelIdentifier
         return (FMU2Slave if self.version == 2 else FMU3Slave), identifier
 
     def _initialise(self) -> None:

@@ -1,4 +1,4 @@
-"""An FMU's mapping: the file that was given, else one beside the FMU, drafted where none is."""
+"""An FMU's mapping: the file that was given, else one next to the FMU, drafted where none is."""
 
 from __future__ import annotations
 

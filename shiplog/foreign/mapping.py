@@ -121,13 +121,13 @@ class Description:
 def draft(of: Description, profile: Profile) -> str:
     """A mapping's TOML; what it is not sure of says CHECK."""
     step = of.step or STEP_S
-    told = bool(of.step) or of.exchange  # which takes no steps
+    has_step = bool(of.step) or of.exchange  # which takes no steps
     lines = [
         f"# Which variables of {_comment(of.name)} (FMI {_comment(of.version)}) are which channels "
         "of the ship.",
         "# Drafted by shiplog: look at every line that says CHECK, and take the CHECK away.",
         "", "[simulator]",
-        f"step_s = {step:g}" + ("" if told else "  # CHECK communication step"),
+        f"step_s = {step:g}" + ("" if has_step else "  # CHECK communication step"),
     ]  # fmt: skip
     if of.tool.startswith("shiplog"):  # its coefficients were fitted to inputs that are held
         lines.append('between = "hold"')

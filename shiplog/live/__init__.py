@@ -1,4 +1,4 @@
-"""A model beside its ship while it sails: the error now, whether it is one too many, and of what.
+"""A model next to its ship while it sails: the error now, whether it is one too many, and of what.
 
     source → causal rows → rollouts that restart → error and band
                         ↘ segments → products G_s → evidence of a change → alarm and suspicion

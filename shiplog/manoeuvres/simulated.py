@@ -189,7 +189,7 @@ def sail(sailor: Sailor, manoeuvre: Manoeuvre, members: int = MEMBERS, **how) ->
     return of_sailed(sailed, outside, manoeuvre, sailor.profile, False)
 
 
-def beside(
+def as_recorded(
     sailor: Sailor,
     found: Found,
     record: Record,

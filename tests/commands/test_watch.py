@@ -10,7 +10,7 @@ import polars as pl
 import pytest
 from commands import call
 
-from shiplog.commands.watch import Told, watch_command
+from shiplog.commands.watch import Reporter, watch_command
 from shiplog.live.session import Watch
 from shiplog.live.sources.base import Arrived
 from shiplog.simulation import rollout
@@ -118,7 +118,7 @@ def test_a_watch_ends_when_nothing_came_for_as_long_as_was_said(published, store
     path.write_bytes(content[: len(content) // 2])
     clock, said = [DAY], []
     done = watch_command(
-        str(path), published[0], Store(store), tmp_path / "out", Told(said.append), per_day=1.0,
+        str(path), published[0], Store(store), tmp_path / "out", Reporter(said.append), per_day=1.0,
         stop_after_s=20.0, now=lambda: clock[0],
         sleep=lambda _: clock.__setitem__(0, clock[0] + 10**9),
     )  # fmt: skip

@@ -35,7 +35,7 @@ class Slope:
 
 
 def slope(
-    trial: Trial, told: Stretches, cause: Cause, starts: Mapping[str, datetime],
+    trial: Trial, information: Stretches, cause: Cause, starts: Mapping[str, datetime],
     freedom: float = math.inf,
 ) -> Slope | None:  # fmt: skip
     """x₁ of (20) of the cause's first number, over the time from the first row to the last; of a
@@ -43,16 +43,16 @@ def slope(
 
         (x₀, x₁) | r ~ N((M + I)⁻¹ y, (M + I)⁻¹)
     """
-    days = days_of(trial, trial.rows[told.first], starts)
+    days = days_of(trial, trial.rows[information.first], starts)
     last = days_of(trial, np.array([len(trial.record) - 1]), starts)[0]
     span = float(last - days_of(trial, np.array([0]), starts)[0])
     if span <= 0.0:
         return None
     tau = np.zeros(len(days)) if cause.over_trial else (days - days.mean()) / span
-    x, V = with_slope(told.y, told.M, tau)
-    q = len(told.unit)
+    x, V = with_slope(information.y, information.M, tau)
+    q = len(information.unit)
     at = 0 if cause.over_trial else q
-    by = told.unit[0] / span / si(cause.parameters[0].unit)
+    by = information.unit[0] / span / si(cause.parameters[0].unit)
     value, spread = float(x[at] * by), NINETY_SPREADS * math.sqrt(V[at, at]) * abs(by)
     parameter = cause.parameters[0]
     unit = "1/day" if parameter.unit == "1" else f"{parameter.unit}/day"

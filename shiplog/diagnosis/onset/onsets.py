@@ -63,12 +63,12 @@ class Onset:
 class Course:
     """What is said of one named cause: an onset, or a slope.
 
-    told   its information in the stretches of the trial
+    information   its information in the stretches of the trial
     """
 
     onset: Onset | None = None
     slope: Slope | None = None
-    told: Stretches | None = None
+    information: Stretches | None = None
 
 
 def of_decision(
@@ -92,30 +92,33 @@ def of_decision(
 def _course(
     trial: Trial, decision: Decision, one: Named, starts: Mapping[str, datetime]
 ) -> Course:  # fmt: skip
-    told = stretch_information.of_cause(trial, decision.fit, one.cause.label)
+    information = stretch_information.of_cause(trial, decision.fit, one.cause.label)
     if one.cause.drifts:
-        return Course(slope=drift.slope(trial, told, one.cause, starts, one.freedom), told=told)
-    if len(told.first) < FEWEST:
-        return Course(told=told)
-    return Course(onset=onset(trial, told, one), told=told)
+        return Course(
+            slope=drift.slope(trial, information, one.cause, starts, one.freedom),
+            information=information,
+        )
+    if len(information.first) < FEWEST:
+        return Course(information=information)
+    return Course(onset=onset(trial, information, one), information=information)
 
 
-def onset(trial: Trial, told: Stretches, one: Named) -> Onset:
+def onset(trial: Trial, information: Stretches, one: Named) -> Onset:
     """Of a cause's information in the stretches of a trial."""
-    places = places_of(trial, told.first)
-    found = change_points.changes(told.y, told.M, places)
+    places = places_of(trial, information.first)
+    found = change_points.changes(information.y, information.M, places)
     ends = 1.0 - found.to_end
     i, j = found.likeliest
     while_on: Mapping[str, ParameterEstimate] = {}
-    if (i, j) != (0, len(told.first)):
-        x, V = change_points.numbers(told.y, told.M, i, j)
-        unit = told.unit
+    if (i, j) != (0, len(information.first)):
+        x, V = change_points.numbers(information.y, information.M, i, j)
+        unit = information.unit
         while_on = one.cause.estimates(x * unit, V * np.outer(unit, unit), one.freedom)
     return Onset(
         _moment(trial, *found.begin()), found.from_start,
         _moment(trial, *found.stop()) if ends >= 0.5 else None, ends, while_on, found.acting,
-        np.append(elapsed(trial.record, trial.rows[told.first]), places.end),
-        tuple(trial.record.names[v] for v in trial.record.voyage[trial.rows[told.first]]),
+        np.append(elapsed(trial.record, trial.rows[information.first]), places.end),
+        tuple(trial.record.names[v] for v in trial.record.voyage[trial.rows[information.first]]),
     )  # fmt: skip
 
 

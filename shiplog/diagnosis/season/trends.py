@@ -156,10 +156,10 @@ def of_courses(
         return found
     for one in named:
         course = courses.get(one.cause.label)
-        if course is None or course.told is None:
+        if course is None or course.information is None:
             continue
         with contextlib.suppress(np.linalg.LinAlgError):  # of a model that hardly is this ship's
-            season = _Season.of(trial, course.told, one.cause, starts)
+            season = _Season.of(trial, course.information, one.cause, starts)
             found[one.cause.label] = season.voyages()
     return found
 
@@ -179,15 +179,15 @@ class _Season:
 
     @classmethod
     def of(
-        cls, trial: Trial, told: Stretches, cause: Cause, starts: Mapping[str, datetime],
+        cls, trial: Trial, information: Stretches, cause: Cause, starts: Mapping[str, datetime],
         events: Sequence[datetime] = (),
     ) -> _Season:  # fmt: skip
-        likelihood, names = voyage_sizes.by_voyage(trial, told, starts, events)
+        likelihood, names = voyage_sizes.by_voyage(trial, information, starts, events)
         dated = set(trial.record.names) <= set(starts)
         wears = cause.kind == WEARS and dated
         pooled = pooling.pool(likelihood, wears, trial.reference.freedom)
         first = min(starts[n] for n in trial.record.names) if dated else None
-        return cls(trial, cause, told.unit, likelihood, names, pooled, first,
+        return cls(trial, cause, information.unit, likelihood, names, pooled, first,
                    tuple(sorted(events)) if dated else ())  # fmt: skip
 
     def voyages(self) -> tuple[OfVoyage, ...]:

@@ -14,7 +14,10 @@ from shiplog.diagnosis.trial.trial import Trial
 
 
 def by_voyage(
-    trial: Trial, told: Stretches, starts: Mapping[str, datetime], events: Sequence[datetime] = ()
+    trial: Trial,
+    information: Stretches,
+    starts: Mapping[str, datetime],
+    events: Sequence[datetime] = (),
 ) -> tuple[Voyages, tuple[str, ...]]:
     """y and M of (17) added over each voyage's stretches, and the voyages' names; those without a
     segment are left out.
@@ -22,11 +25,11 @@ def by_voyage(
     events   at which a level ends and another one begins
     """
     record = trial.record
-    voyage = record.voyage[trial.rows[told.first]]
+    voyage = record.voyage[trial.rows[information.first]]
     names = np.unique(voyage)
     add = (names[:, None] == voyage).astype(float)
-    y = add @ told.y
-    M = np.einsum("vb,bpcq,wc->vpwq", add, told.M, add, optimize=True)
+    y = add @ information.y
+    M = np.einsum("vb,bpcq,wc->vpwq", add, information.M, add, optimize=True)
     days = np.array([middle_of(trial, int(v), starts) for v in names])
     level = np.zeros(len(names), dtype=int)
     if events and set(record.names) <= set(starts):

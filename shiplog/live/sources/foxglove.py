@@ -101,7 +101,7 @@ class Foxglove:
             elif isinstance(item, ConnectionError):
                 notes.append(f"The connection to {self.name} failed: {item}. It is tried again.")
             elif isinstance(item, str):
-                self._told(item, notes)
+                self._control_message(item, notes)
             elif (message := self._message(item)) is not None:
                 messages.append(message)
         if self._dropped:
@@ -110,17 +110,17 @@ class Foxglove:
         frames = self.decoding.frames([messages]) if messages else {}
         return Arrived(frames, tuple(notes), topics=frozenset(self.topics))
 
-    def _told(self, text: str, notes: list[str]) -> None:
+    def _control_message(self, text: str, notes: list[str]) -> None:
         try:
-            told = json.loads(text)
-            kind = told.get("op")
+            message = json.loads(text)
+            kind = message.get("op")
             if kind == "advertise":
-                self._advertised(told["channels"])
+                self._advertised(message["channels"])
             elif kind == "unadvertise":
-                for number in told["channelIds"]:
+                for number in message["channelIds"]:
                     self._numbers.pop(int(number), None)
-            elif kind == "status" and told.get("level", 0) > 0:
-                notes.append(f"{self.name} says: {str(told.get('message'))[:200]}.")
+            elif kind == "status" and message.get("level", 0) > 0:
+                notes.append(f"{self.name} says: {str(message.get('message'))[:200]}.")
         except (ValueError, KeyError, TypeError, AttributeError):
             notes.append(f"{self.name} sent a message that is not of its protocol.")
 
