@@ -181,7 +181,7 @@ def of_c(job: Job, folder: Path) -> float:
 
 
 def main(given: Sequence[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])  # type: ignore[union-attr]
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("run", type=Path)
     parser.add_argument("--network", type=Path)
     parser.add_argument("--single", type=Path)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shiplog.export import python_file
+from shiplog.export import python_file, written_python
 from shiplog.export.filled import filled, inert
 from shiplog.export.job import Job
 from shiplog.export.not_loaded import NotLoaded
@@ -68,8 +68,7 @@ def compare(job: Job, path: Path) -> Difference:
 def driven(ship: Ship, trial: Trial, path: Path, sample: float) -> np.ndarray:
     """[n, 6] at the end of each inner step, by the loop of the simulator's `mainLoop.simulate` at
     that sample time."""
-    known: dict = {"__name__": ship.identifier}
-    exec(compile(path.read_text("utf-8"), path.name, "exec"), known)
+    known = written_python.names_of(path, ship.identifier)
     wind, current = trial.water.wind, trial.water.current
     vehicle = known[vehicle_name(ship)](
         V_current=float(np.hypot(*current)),

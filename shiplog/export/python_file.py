@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shiplog.export import statements
+from shiplog.export import statements, written_python
 from shiplog.export.filled import filled, inert
 from shiplog.export.job import Job
 from shiplog.export.languages import PYTHON
@@ -60,8 +60,7 @@ def text(ship: Ship, record: Sequence[str]) -> str:
 
 def sail(ship: Ship, trial: Trial, path: Path) -> np.ndarray:
     """[n, 6] by the file itself, which shiplog has just written."""
-    known: dict = {"__name__": ship.identifier}
-    exec(compile(path.read_text("utf-8"), path.name, "exec"), known)
+    known = written_python.names_of(path, ship.identifier)
     made = known["Ship"](*trial.start)
     found = np.empty((len(trial.orders), 6))
     for k, orders in enumerate(trial.orders):

@@ -11,12 +11,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from shiplog.exceptions import ModelError
-from shiplog.export import hull_terms
+from shiplog.export import hull_terms, written_python
 from shiplog.export.filled import inert
 from shiplog.export.job import Job
 from shiplog.export.not_loaded import NotLoaded
@@ -153,8 +152,7 @@ def compare(job: Job, path: Path) -> Difference:
         )
     except ImportError as error:
         raise NotLoaded("shipmmg is not installed (pip install shipmmg)") from error
-    known: dict[str, Any] = {}
-    exec(compile(path.read_text("utf-8"), path.name, "exec"), known)
+    known = written_python.names_of(path, path.stem)
     sailed, _ = job.sailor.sail(job.trial.schedule, members=1, seconds=SECONDS)
     names = [a.kind for a in job.run.profile.actuators]
     rudder, screw = (sailed.actuator[0, :, names.index(k)] for k in ("rudder", "propeller"))

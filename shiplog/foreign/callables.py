@@ -116,7 +116,7 @@ class PythonFunction:
                     found, troubles = np.array(self._many(rows), dtype=float), []
                 if found.shape != (len(rows), self.width):
                     raise ValueError(f"it returned an array of shape {found.shape}")
-            except Exception:
+            except Exception:  # of a user's function, anything: each row is then asked by itself
                 many, self.layout = self.layout, SINGLE
                 try:
                     found, troubles = self._alone(rows, many)
@@ -212,7 +212,7 @@ class PythonFunction:
         try:
             with time_limit(10.0 * CALL_S):
                 return np.asarray(jax.jit(jax.vmap(jax.jacfwd(one)))(rows))[..., :-1]
-        except Exception:
+        except Exception:  # of a user's function, anything: then it has no derivatives of JAX's
             return None
 
     def _library(self, row: np.ndarray) -> tuple[str, np.ndarray]:

@@ -96,7 +96,7 @@ def save(folder: Path, saved: Saved) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with files.whole(folder / STATE) as partial, partial.open("wb") as stream:
-            np.savez(stream, facts=text, **saved.arrays)  # type: ignore[arg-type]
+            np.savez(stream, facts=text, **saved.arrays)  # type: ignore[arg-type]  # none is an option
     except OSError as error:
         raise ShiplogError(
             f"The state of the watch cannot be written into {folder}: {error.strerror}.",

@@ -45,7 +45,7 @@ class Window:
             kept.append(frame)
             if len(kept) > JOINED:
                 kept[:] = [pl.concat(kept, how="diagonal_relaxed")]
-            self.newest = max(self.newest, int(frame["log_time"].max() or 0))  # type: ignore[arg-type]
+            self.newest = max(self.newest, last_time(frame))
             count += frame.height
         if count:
             self._forget()
@@ -73,16 +73,33 @@ class Window:
     def _forget(self) -> None:
         since = self.newest - round(self.seconds * SECOND_NS)
         for topic, parts in list(self.parts.items()):
-            if int(parts[0]["log_time"].min() or 0) < since - SECOND_NS * 10:  # type: ignore[operator]
+            if first_time(parts[0]) < since - SECOND_NS * 10:
                 kept = pl.concat(parts, how="diagonal_relaxed").filter(pl.col("log_time") > since)
                 self.parts[topic] = [kept]
                 if not kept.height:
                     del self.parts[topic]
 
 
+def first_time(frame: pl.DataFrame) -> int:
+    """The earliest log time of some messages of a topic [ns]; 0 where none has one."""
+    times = frame["log_time"].drop_nulls().to_numpy()
+    return int(times.min()) if len(times) else 0
+
+
+def last_time(frame: pl.DataFrame) -> int:
+    """The latest log time of some messages of a topic [ns]; 0 where none has one."""
+    times = frame["log_time"].drop_nulls().to_numpy()
+    return int(times.max()) if len(times) else 0
+
+
+def newest(frames: Frames) -> int:
+    """The latest log time of them [ns]; 0 where there is no message."""
+    return max((last_time(f) for f in frames.values()), default=0)
+
+
 def oldest(frames: Frames) -> int:
     """The earliest log time of them [ns]; 0 where there is no message."""
-    times = [int(f["log_time"].min() or 0) for f in frames.values() if f.height]  # type: ignore[arg-type]
+    times = [first_time(f) for f in frames.values() if f.height]
     return min(times, default=0)
 
 
@@ -129,7 +146,7 @@ class Inflow:
 
     def take(self, seconds: float) -> dict[str, pl.DataFrame]:
         """The oldest messages, of so many seconds by the recorder's clock."""
-        firsts = [int(f["log_time"].min() or 0) for fs in self._waiting.values() for f in fs]  # type: ignore[arg-type]
+        firsts = [first_time(f) for fs in self._waiting.values() for f in fs]
         if not firsts:
             return {}
         until = min(firsts) + round(seconds * SECOND_NS)

@@ -108,11 +108,7 @@ class Watch:
         self.ended = arrived.ended
         if not arrived.ended:
             yield from self.health.arrivals(self.last_arrival, clock, self.source.name)
-        newest = max(
-            (int(f["log_time"].max() or 0) for f in arrived.frames.values() if f.height),  # type: ignore[arg-type]
-            default=0,
-        )
-        if newest:
+        if newest := messages.newest(arrived.frames):
             yield from self.health.clock(newest, clock, self.source.live)
 
     def _take(self, frames: Frames) -> Iterator[Event]:

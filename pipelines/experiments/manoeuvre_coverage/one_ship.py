@@ -86,7 +86,7 @@ def done(number: int, out: Path, extended: bool, keep: bool, judge: bool) -> str
     folder, began = out / f"ship_{number}", time.process_time()
     try:
         one_ship(number, folder, extended=extended, keep=keep, judge=judge)
-    except Exception:
+    except Exception:  # a bug of one ship, too: it is counted and listed, after hours of others
         folder.mkdir(parents=True, exist_ok=True)
         (folder / FAILED).write_text(traceback.format_exc(), encoding="utf-8")
         return f"ship {number}: failed, see {folder / FAILED}"

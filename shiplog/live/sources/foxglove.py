@@ -70,7 +70,7 @@ class Foxglove:
             try:
                 with self._connect(
                     self.name, subprotocols=PROTOCOLS, max_size=None, open_timeout=AGAIN_S
-                ) as opened:  # type: ignore[arg-type]
+                ) as opened:  # type: ignore[arg-type]  # its own alias of str for a protocol's name
                     self._open = opened
                     self._put(None)
                     for frame in opened:
