@@ -130,13 +130,8 @@ def of_fit(
 
 
 def _warn_of_far(seasons: Mapping[str, _Season]) -> None:
-    """Say which voyages are FAR from what all have in common: |x̄_v - x̄| > FAR sd(x_v)."""
-    far: dict[str, None] = {}
-    for of in seasons.values():
-        sizes = of.pooled.sizes  # [draws, V, p]
-        mean, spread = sizes.mean(0), sizes.std(0)
-        apart = (np.abs(mean - mean.mean(0)) > FAR * spread).any(-1)
-        far |= dict.fromkeys(name for name, one in zip(of.names, apart, strict=True) if one)
+    """Say which voyages are FAR from what all have in common."""
+    far = dict.fromkeys(name for of in seasons.values() for name in of.far)
     if far:
         log.warning(
             "%s: far from what the voyages have in common, about which all sizes are linear. The "
@@ -149,8 +144,8 @@ def of_courses(
     trial: Trial, named: Sequence[Named], courses: Mapping[str, Course],
     starts: Mapping[str, datetime],
 ) -> dict[str, tuple[OfVoyage, ...]]:  # fmt: skip
-    """Label → each named cause of a verdict in each voyage; none of one voyage alone, or of very
-    many, of which `shiplog trend` has them."""
+    """Label → each named cause of a verdict in each voyage; none of one voyage alone, of very many,
+    of which `shiplog trend` has them, or of voyages that are FAR from each other."""
     found: dict[str, tuple[OfVoyage, ...]] = {}
     if not 2 <= len(trial.record.names) <= MOST_VOYAGES:
         return found
@@ -160,7 +155,8 @@ def of_courses(
             continue
         with contextlib.suppress(np.linalg.LinAlgError):  # of a model that hardly is this ship's
             season = _Season.of(trial, course.information, one.cause, starts)
-            found[one.cause.label] = season.voyages()
+            if not season.far:
+                found[one.cause.label] = season.voyages()
     return found
 
 
@@ -189,6 +185,13 @@ class _Season:
         first = min(starts[n] for n in trial.record.names) if dated else None
         return cls(trial, cause, information.unit, likelihood, names, pooled, first,
                    tuple(sorted(events)) if dated else ())  # fmt: skip
+
+    @property
+    def far(self) -> tuple[str, ...]:
+        """Voyages with |x̄_v - x̄| > FAR sd(x_v), x [draws, V, q] their sizes."""
+        mean, spread = self.pooled.sizes.mean(0), self.pooled.sizes.std(0)
+        apart = (np.abs(mean - mean.mean(0)) > FAR * spread).any(-1)
+        return tuple(name for name, one in zip(self.names, apart, strict=True) if one)
 
     def voyages(self) -> tuple[OfVoyage, ...]:
         """The cause in each of them."""
