@@ -188,16 +188,13 @@ def test_a_damaged_summary_is_not_believed_of_a_chunk_without_a_checksum(reading
     assert numbers(reading(data, "spoilt.mcap")) == without(3)
 
 
-def test_a_log_of_one_chunk_whose_checksum_is_wrong_is_read_and_is_not_vouched_for(reading):
-    """Four bytes must not cost a whole log. Where another chunk is sound, it is lost."""
+def test_a_chunk_whose_checksum_is_wrong_is_not_read_even_where_it_is_all_there_is(reading):
+    """One of its bytes is wrong, and nothing says which: the log is refused with that reason."""
     header, first, *_ = parts()
     raw = zstandard.ZstdDecompressor().decompress(first[1][44:])
     wrong = (mcap.CHUNK, packed(raw, 0, EACH - 1, crc=zlib.crc32(raw) ^ 1))
-    found = reading(file([header, wrong]))
-    assert numbers(found) == list(range(EACH))
-    (finding,) = found.health.findings
-    assert finding.kind == "crc" and "nothing vouches for their values" in finding.sentence
-    assert found.health.chunks_lost == 0
+    with pytest.raises(LogUnreadable, match="does not match its checksum"):
+        reading(file([header, wrong]))
     second = parts()[3 + len(TOPICS) - 1]
     assert second[0] == mcap.CHUNK
     with_sound = reading(file([header, wrong, second], described()), "two.mcap")
@@ -205,28 +202,6 @@ def test_a_log_of_one_chunk_whose_checksum_is_wrong_is_read_and_is_not_vouched_f
     with pytest.raises(LogUnreadable, match="does not have the size it states"):
         short = (mcap.CHUNK, packed(raw, 0, EACH - 1, size=len(raw) - 1))
         reading(file([header, short]), "no.mcap")
-
-
-def test_a_chunk_with_a_wrong_checksum_and_wrong_records_is_lost_once(tmp_path):
-    """Its bytes are no records, so it is not read."""
-    header, first, *_ = parts()
-    raw = zstandard.ZstdDecompressor().decompress(first[1][44:])
-    spoilt = raw + struct.pack("<BQ", mcap.MESSAGE, 1 << 40)  # a message that ends nowhere
-    wrong = (mcap.CHUNK, packed(spoilt, 0, EACH - 1, crc=zlib.crc32(raw) ^ 1))
-    path = tmp_path / "spoilt.mcap"
-    path.write_bytes(file([header, wrong]))
-    found = scan.survey(path)
-    assert list(scan.walk(found)) == []
-    assert [loss.reason for loss in found.losses if loss.chunk] == ["does not match its checksum"]
-
-
-def test_a_chunk_with_a_wrong_checksum_is_read_by_the_descriptions_outside_it(reading):
-    header, *_ = parts()
-    channels = [(mcap.CHANNEL, mcap.channel(n, 0, t, "json")) for n, t in enumerate(TOPICS, 1)]
-    body = mcap.message(2, 0, START, START, payload(5))
-    wrong = (mcap.CHUNK, packed(mcap.record(mcap.MESSAGE, body), 0, 0, crc=1))
-    found = reading(file([header, *channels, wrong]))
-    assert (numbers(found), set(found.frames)) == ([5], {"/wind"})
 
 
 @pytest.mark.parametrize("opcode", [k for k in range(1, 256, 7)] + list(range(1, 16)))

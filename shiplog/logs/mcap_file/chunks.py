@@ -119,15 +119,6 @@ def message_counts(sound: Chunk) -> Counter[int]:
     return counts
 
 
-def holds_records(sound: Chunk) -> bool:
-    """Whether an opened chunk is records from its first byte to its last."""
-    try:
-        message_counts(sound)
-    except ValueError:
-        return False
-    return True
-
-
 def alone(item: Alone, counts: Counter[int] | None) -> Iterator[McapRecord]:
     """The same of a record that stands in no chunk."""
     body = memoryview(item.body)

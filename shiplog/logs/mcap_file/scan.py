@@ -47,10 +47,6 @@ LONGEST_ALONE = 1_000_000  # bytes of a message that a search takes: in most byt
 LEAST_DESCRIPTION, LARGEST_DESCRIPTION = 14, 1 << 22  # bytes; large schemas have 100 kB
 NEAR_NS = 10**14  # 28 h: how far from the others the log time of such a message may be
 LONGEST_FOOTER = 64  # bytes, of which 20 are known
-UNVOUCHED = (
-    "holds a chunk that does not match its checksum. No other message can be read, so its were: "
-    "nothing vouches for their values"
-)
 # What may be unpacked: real logs are packed to a tenth, seldom to a fiftieth, of their size.
 MOST_WORK, MOST_RATIO = 8 << 30, 50
 
@@ -150,27 +146,10 @@ class _Walk:
                 if item is not None:
                     yield item
                 position = after
-            if self.low is None:
-                yield from self._unvouched()
         except _Enough:
             reason = "unpacks to far more than a log of its size can; what follows was not read"
             found.losses.append(Loss("crc", self.anchor, reason, start=self.high))
         self._finish()
-
-    def _unvouched(self) -> Iterator[Item]:
-        """Chunks that are whole but for their CRC, where no other message of the log can be read.
-
-        One wrong bit in the CRC of a log of a single chunk must not cost all of it.
-        """
-        self.closed = False  # the end of the log was met, and no other log begins
-        for i, loss in enumerate(tuple(self.found.losses)):
-            if not loss.chunk:
-                continue
-            _, length, _ = head(self.stream, loss.offset, self.found.size)
-            whole = self._open(loss.offset, length, vouched=False)
-            if isinstance(whole, Sound) and chunks.holds_records(whole.chunk):
-                self.found.losses[i] = Loss("crc", loss.offset, UNVOUCHED)
-                yield self._take(whole, whole.end)
 
     def _step(self, position: int) -> tuple[Loss | None, Item | None, int]:
         """What stands at `position`: a fault, or an item or none and where the next record is."""
@@ -283,9 +262,8 @@ class _Walk:
                 note(self.found, record, SUMMED, self.section)
         return self.section
 
-    def _open(self, position: int, length: int, vouched: bool = True) -> Sound | Loss:
-        """The chunk whose body of this length follows the head at `position`, checked; but for its
-        CRC, where it need not be `vouched` for."""
+    def _open(self, position: int, length: int) -> Sound | Loss:
+        """The chunk whose body of this length follows the head at `position`, checked."""
         most = chunks.FIXED_BYTES + chunks.LONGEST_NAME
         start = read_at(self.stream, position + HEAD.size, most)
         if chunks.stated(start[: max(length, 0)], length) is None:
@@ -298,10 +276,7 @@ class _Walk:
         if self.work < 0:
             raise _Enough
         try:
-            if vouched:
-                opened = self.ahead.opened(position, packed)
-            else:
-                opened = chunks.opened(replace(packed, uncompressed_crc=0))
+            opened = self.ahead.opened(position, packed)
         except ValueError as error:
             return lost(position, str(error), packed)
         begin = chunks.FIXED_BYTES + len(packed.compression.encode())
