@@ -9,9 +9,9 @@ import pytest
 from searchable import raised_noise, search_of, searched, trial_with
 from straight import CAUSES, One
 
+from shiplog.diagnosis.hypotheses import evidence, weighing
 from shiplog.diagnosis.hypotheses import search as searching
 from shiplog.diagnosis.hypotheses import table as hypotheses
-from shiplog.diagnosis.hypotheses import weighing
 from shiplog.diagnosis.hypotheses.search import Search
 from shiplog.diagnosis.noise.remainder import NOMINAL, RAISED, Remainder
 from shiplog.diagnosis.trial.fitted import Point
@@ -200,6 +200,41 @@ def test_another_form_takes_the_place_of_one_that_promised_more(monkeypatch):
     monkeypatch.setattr(searching, "additions", misled)
     found = searched({"clock:gnss": [1.2]}, alike=("clock:wind", "clock:gnss", 0.25))
     assert found.table.ranked()[0].causes == ("clock:gnss",)
+
+
+def test_an_addition_is_judged_where_it_is_linearised_and_not_by_a_derivative(monkeypatch):
+    """A derivative that promises little of the hidden cause and much of another: from nearer the
+    gains are those of fits of either."""
+    trial, point = trial_with({"drag": [1.2]})
+    found = search_of(trial, point)
+    found.weigh((), {}, point, later=True)
+    nothing = found.table.nothing
+    fit, causes = found.table.fit(nothing), found.table.catalogue
+    scan = evidence.scan
+
+    def misled(*given):
+        base, promised = scan(*given)
+        wrong = {"drag": 1.0, "load": 80.0}
+        return base, [replace(f, evidence=wrong.get(f.name, -1.0)) for f in promised]
+
+    monkeypatch.setattr(searching.evidence, "scan", misled)
+    by_derivative = searching.additions(found.table, nothing, fit, causes)
+    assert [labels for labels, _, _ in by_derivative] == [("load",)]
+    nearer = searching.additions(found.table, nothing, fit, causes, nearer=True)
+    assert nearer[0][0] == ("drag",)
+    monkeypatch.setattr(searching.evidence, "scan", scan)
+    (of_drag,) = (score for labels, _, score in nearer if labels == ("drag",))
+    found.weigh(("drag",), {"drag": np.zeros(1)}, point)
+    reached = found.table.scale.score(
+        found.table.found[("drag",), NOMINAL].evidence, ("drag",), NOMINAL
+    )
+    assert of_drag == pytest.approx(reached, abs=2.0)
+    monkeypatch.setattr(trial.__class__, "linearise", diverging)
+    assert searching.additions(found.table, nothing, fit, causes, nearer=True) == []
+
+
+def diverging(*given):
+    raise np.linalg.LinAlgError
 
 
 def test_what_is_banned_together_stays_alone(monkeypatch):

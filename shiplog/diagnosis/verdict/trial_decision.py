@@ -74,7 +74,8 @@ def decide_trial(
             run, nominal, recorded, causes, lacking, numbers, barred=barred, parts=parts,
             excluded=excluded,
         )  # fmt: skip
-        return _searched(run, replace(made, trial=share(made.trial)), reach, parts, numbers)
+        made = replace(made, trial=share(made.trial))
+        return _searched(run, made, reach, parts, numbers, nominal is None and run.given)
 
     found = searched()
     if nominal is None and run.given and (numbers := found.numbers):
@@ -116,7 +117,7 @@ class _Searched:
 
 def _searched(
     run: Run, made: setup.Setup, reach: Callable[[str], None], parts: Parts,
-    likely: Mapping[str, np.ndarray] | None,
+    likely: Mapping[str, np.ndarray] | None, nearer: bool,
 ) -> _Searched:  # fmt: skip
     memory.give_back()  # what the nominal campaign took
     trial, point = evidence.begin(made.trial, run.extension_numbers())
@@ -126,6 +127,8 @@ def _searched(
         trial.reference.counts,
     )  # fmt: skip
     reach("hypotheses")
-    search = Search(trial, point, placebo.placebos(trial.campaign), likely, parts=parts)
+    search = Search(
+        trial, point, placebo.placebos(trial.campaign), likely, parts=parts, nearer=nearer
+    )
     search.run()
     return _Searched(trial, made.untested, point, search)
