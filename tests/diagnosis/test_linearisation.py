@@ -1,6 +1,6 @@
 """Short rollouts: order of the integration, and derivatives against differences."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -8,8 +8,14 @@ from toy_ship import DAMP, GRID, RECORD, ROWS, SETTING, THETA, TURN, Coasting, T
 
 from shiplog.diagnosis.linear import jax_paths, linearisation, measurement_correction, segments
 from shiplog.diagnosis.linear.linear_segments import Path
-from shiplog.models.causes.sensors import AntennaOffset, HeadingOffset
-from shiplog.models.causes.steering import RudderDelay, RudderLag
+from shiplog.models.causes import Cause, Parameter
+from shiplog.models.causes.sensors import (
+    AntennaOffset,
+    ClockOffset,
+    HeadingOffset,
+    WindDirectionOffset,
+)
+from shiplog.models.causes.steering import RudderDelay, RudderLag, RudderOffset
 from shiplog.voyages.rows.recording import Record
 
 
@@ -192,3 +198,75 @@ def test_what_drives_is_kept_as_the_series_that_are_not_zero():
     late = [RudderLag().read(windy, by).actuator for by in (step, 0.0 * step)]
     by_hand = segments.average_at_instants(windy, ROWS, late[0] - late[1]) / step
     assert dense[..., 0, 3] == pytest.approx(by_hand[..., 0], abs=1e-12)
+
+
+WINDY = replace(RECORD, wind=RECORD.wind + np.array([3.0, 1.0]))
+NUMBERS = (
+    {"antenna_offset": np.array([0.4, -0.2]), "rudder_lag": np.array([1.5])},
+    {"antenna_offset": np.array([0.1, 0.3]), "rudder_lag": np.array([1.5])},  # actuators as before
+    {"clock_offset:wind": np.array([0.7]), "rudder_offset": np.array([0.05])},
+    {"clock_offset:position": np.array([-0.4]), "wind_direction_offset": np.array([0.2])},
+)
+
+
+@dataclass(frozen=True)
+class Slip(Cause):
+    """One of a user's: a rudder that acts less the faster the ship goes, as the log has it."""
+
+    name = "slip"
+    kind = "ship"
+    user = True
+    parameters = (Parameter("share", "1", 0.2, 0.01),)
+
+    def read(self, record, p):
+        return replace(record, actuator=record.actuator * (1.0 - p[0] * record.state[:, [1]]))
+
+
+@pytest.mark.parametrize("own", [(), (Slip(),)], ids=["catalogue", "a user's"])
+def test_what_is_passed_over_or_kept_changes_no_column(own):
+    """Every cause applied to either end of every difference, and nothing kept: the same to the last
+    bit, from one reading to the next."""
+    sensors = (
+        HeadingOffset(), ClockOffset("position"), ClockOffset("wind"), AntennaOffset(),
+        WindDirectionOffset(),
+    )  # fmt: skip
+    model = Toy((RudderOffset(("rudder",)), RudderLag(), RudderDelay(), *own, *sensors))
+    kept = measurement_correction.ActuatorColumns()
+    for numbers in (*NUMBERS, NUMBERS[0]):
+        given = numbers | {one.label: np.array([0.1]) for one in own}
+        _, moved, observed = measurement_correction.read(model, SETTING, WINDY, ROWS, given, kept)
+        drives, seen = by_every_cause(model, given)
+        assert np.array_equal(moved.dense(), drives)
+        assert np.array_equal(observed, seen)
+    assert len(kept.series) == (0 if own else 3)
+
+
+def by_every_cause(model, given):
+    """du/dq and dy/dq with all causes behind each one applied to both records."""
+    drives, seen, before = [], [], WINDY
+    for place, cause in enumerate(model.causes):
+        here = given.get(cause.label, np.zeros(cause.count))
+        low, high = cause.bounds(SETTING)
+        smooth = measurement_correction.AVERAGING_S
+        moving = before.smoothed(smooth) if cause.shifts else before
+        for i, size in enumerate(cause.sizes(SETTING)):
+            step = np.zeros(cause.count)
+            step[i] = measurement_correction.READ_STEP * size
+            ends = np.minimum(here + step, high), np.maximum(here - step, low)
+            apart = ends[0][i] - ends[1][i]
+            more, less = (
+                measurement_correction.corrected(
+                    model.causes[place + 1 :], cause.read(moving, end), given
+                )
+                for end in ends
+            )
+            parts = (
+                more.actuator - less.actuator, np.zeros((len(WINDY), 1)),
+                more.true_wind - less.true_wind,
+            )  # fmt: skip
+            change = np.concatenate(parts, 1)
+            drives.append(segments.average_at_instants(WINDY, ROWS, change) / apart)
+            between = replace(more, state=more.state - less.state)
+            seen.append(segments.means_of_bins(between, ROWS) / apart)
+        before = measurement_correction.corrected((cause,), before, given)
+    return np.stack(drives, -1), np.stack(seen, -1)

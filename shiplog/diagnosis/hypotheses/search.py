@@ -57,6 +57,7 @@ from shiplog.models.causes import Cause
 MOST_CAUSES = 5  # of a hypothesis; of a ship with more the given coefficients are another ship's
 MOST_SETS = 16  # that are linearised; the others are far behind
 LIKELY = 0.3  # share of the best one's evidence: before it is linearised a cause may lack more
+WHATEVER_SIZE = 100.0  # realistic sizes, beyond which no cause is what its numbers say
 CONTENDERS = 3  # causes that are tried from one hypothesis
 # nats of the best addition, up to which all are looked at from nearer: on the Esso Osaka with its
 # published coefficients a derivative promised from 50 too few to 80 too many
@@ -306,7 +307,10 @@ class Search:
             name: expected.common_size(thresholds.SHOWS_NATS)
             for name, expected in self.expected.items()
         }
-        blind = [f"{name_of(n)} below {s:.0%}" for n, s in shares.items() if s > 1.0]
+        blind = [
+            f"{name_of(n)} below {s:.0%}" if s < WHATEVER_SIZE else f"{name_of(n)} at any size"
+            for n, s in shares.items() if s > 1.0
+        ]  # fmt: skip
         if blind:
             log.info("not detectable at realistic size: %s", ", ".join(dict.fromkeys(blind)))
 

@@ -6,14 +6,17 @@ h (READ_STEP of its realistic size), within the number's bounds:
     ∂u/∂q ≈ (u(q + h) - u(q - h)) / 2h,   ∂y/∂q ≈ (y(q + h) - y(q - h)) / 2h
 
 Causes read one after the other, in the catalogue's order, each what the one before it has made.
+Those that change nothing of what a number changes are passed over: the difference is the same
+without them.
 A number changes few of the things that drive a ship: ∂u/∂q is kept as the series that are not zero
 (`Moved`).
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -108,54 +111,109 @@ def as_hypothesised(cut: Cut, causes: Sequence[Cause], numbers: Mapping[str, np.
     return replace(cut, factors=factors(causes, numbers), water=water(causes, numbers))
 
 
+@dataclass
+class ActuatorColumns:
+    """Columns of causes that change nothing but actuators, of one record and its segments: they
+    depend on the numbers of such causes alone, and a sensor's clock leaves them as they were.
+
+    of      label and numbers of each cause that changes actuators, when they were worked out
+    series  number q → (d, q) → ∂u_d/∂q [S, K]
+    """
+
+    of: tuple = ()
+    series: dict[int, dict[tuple[int, int], np.ndarray]] = field(default_factory=dict)
+
+    def begin(self, of: tuple) -> None:
+        """Forget what belongs to other numbers."""
+        if of != self.of:
+            self.of, self.series = of, {}
+
+
 def read(
     model: Extended,
     setting: Setting,
     record: Record,
     rows: np.ndarray,
     numbers: Mapping[str, np.ndarray] | None = None,
+    kept: ActuatorColumns | None = None,
 ) -> tuple[Cut, Moved, np.ndarray]:
     """Segments as read with `numbers` (label → q, SI), ∂u/∂q [S, K, D, Q] and O = ∂y/∂q
     [S, B, 6, Q] there, zero for causes that change no reading. Those of a clock are of the motion
-    averaged over AVERAGING_S, since the noise of a derivative says nothing of a clock."""
+    averaged over AVERAGING_S, since the noise of a derivative says nothing of a clock.
+
+    kept   of the same record and segments, from one reading to the next
+    """
     given = dict(numbers or {})
+    kept = ActuatorColumns() if kept is None else kept
     sizes = {c.label: c.sizes(setting) for c in model.causes}
     columns = Columns(0, model.causes, np.concatenate([*sizes.values(), np.zeros(0)]))
-    base = segments.cut(corrected(model.causes, record, given), rows)
-    base = as_hypothesised(base, model.causes, given)
+    steps = [record]  # as read by each cause and those before it
+    for cause in model.causes:
+        steps.append(corrected((cause,), steps[-1], given))
+    base = as_hypothesised(segments.cut(steps[-1], rows), model.causes, given)
+    changed = [_apart(one, two) for one, two in itertools.pairwise(steps)]
+    acting = [c for c, of in zip(model.causes, changed, strict=True) if "actuator" in of]
+    if any(cause.user for cause in acting):  # they may act by anything that was recorded
+        kept = ActuatorColumns()
+    kept.begin(tuple((c.label, np.asarray(given[c.label]).tobytes()) for c in acting))
     shape = (*base.driven.shape, len(columns.unit))
     moved: dict[tuple[int, int], np.ndarray] = {}  # (d, q) → its series
     observed = np.zeros((*base.y.shape, len(columns.unit)))
-    before = record  # as the causes before this one have it
-    averaged, of = record, None  # that record averaged, which several clocks share
+    averaged, of = record, None  # a record averaged, which several clocks share
     for place, cause in enumerate(model.causes):
         if not cause.reads:
             continue
+        before = steps[place]
         here = given.get(cause.label, np.zeros(cause.count))
         low, high = cause.bounds(setting)
         if cause.shifts and of is not before:
             averaged, of = before.smoothed(AVERAGING_S), before
         moving = averaged if cause.shifts else before
         for i, column in enumerate(columns.indices[cause.label]):
+            if column in kept.series:
+                moved |= kept.series[column]
+                continue
             step = np.zeros(cause.count)
             absent = cause.first_step if here[i] == 0.0 else 0.0
             step[i] = (absent or READ_STEP) * sizes[cause.label][i]
             # not beyond what it may be: a lag that is negative sharpens steps and noise
             ends = np.minimum(here + step, high), np.maximum(here - step, low)
             apart = ends[0][i] - ends[1][i]
-            more, less = (
-                corrected(model.causes[place + 1 :], cause.read(moving, end), given) for end in ends
-            )
-            # of what both share nothing changes
-            if more.actuator is not less.actuator:
-                change = segments.average_at_instants(record, rows, more.actuator - less.actuator)
-                moved |= {(d, column): v / apart for d, v in enumerate(np.moveaxis(change, -1, 0))}
-            if more.wind is not less.wind or more.state is not less.state:
+            more, less = (cause.read(moving, end) for end in ends)
+            felt = _felt(_apart(more, less))
+            later = [
+                c for c, of in zip(model.causes[place + 1 :], changed[place + 1 :], strict=True)
+                if of & felt or (felt and c.user)
+            ]  # fmt: skip
+            more, less = (corrected(later, one, given) for one in (more, less))
+            differ = _apart(more, less)  # of what both share nothing changes
+            found: dict[tuple[int, int], np.ndarray] = {}
+            if "actuator" in differ:
+                change = more.actuator - less.actuator
+                units = np.flatnonzero(change.any(0))
+                change = segments.average_at_instants(record, rows, change[:, units])
+                found |= {(d, column): change[..., k] / apart for k, d in enumerate(units.tolist())}
+            if differ & {"wind", "state"}:
                 change = segments.average_at_instants(record, rows, more.true_wind - less.true_wind)
                 for d, values in enumerate(np.moveaxis(change, -1, 0), shape[2] - 2):
-                    moved[d, column] = values / apart
-            if more.state is not less.state:
+                    found[d, column] = values / apart
+            if "state" in differ:
                 between = replace(more, state=more.state - less.state)
                 observed[..., column] = segments.means_of_bins(between, rows) / apart
-        before = corrected((cause,), before, given)
+            if differ <= {"actuator"} and not cause.user:
+                kept.series[column] = found
+            moved |= found
     return base, Moved.of(shape, moved), observed
+
+
+def _apart(one: Record, other: Record) -> frozenset[str]:
+    """What two records do not share."""
+    return frozenset(
+        name for name in ("state", "actuator", "wind")
+        if getattr(one, name) is not getattr(other, name)
+    )  # fmt: skip
+
+
+def _felt(differ: frozenset[str]) -> frozenset[str]:
+    """What a difference is felt through: the true wind is worked out from wind and motion."""
+    return differ | {"wind", "state"} if differ & {"wind", "state"} else differ

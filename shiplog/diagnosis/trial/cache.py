@@ -13,7 +13,7 @@ from weakref import ref
 import numpy as np
 
 from shiplog.diagnosis.linear.linear_segments import Path
-from shiplog.diagnosis.linear.measurement_correction import Moved
+from shiplog.diagnosis.linear.measurement_correction import ActuatorColumns, Moved
 from shiplog.diagnosis.linear.segments import Cut
 from shiplog.diagnosis.noise.part_products import PartPass
 from shiplog.diagnosis.noise.remainder import Remainder
@@ -40,7 +40,9 @@ class Cache:
 
     starts    where fits converged, written by `evaluate.resume`
     readings  numbers of sensors' causes, and the trial as read with them: as it is, and as it was
-              last; written by `Trial`. The rest is written by `Products`:
+              last; written by `Trial`
+    acted     columns of causes that change actuators alone, from one reading to the next. The rest
+              is written by `Products`:
     passes    parts of the point that was asked for last, with its weights. A point is known by its
               path, which outlives its linearisation
     first     the same of the first point, for its volumes
@@ -51,6 +53,7 @@ class Cache:
 
     starts: dict[Key, Start] = field(default_factory=dict)
     readings: list[tuple[Numbers, Read]] = field(default_factory=list)
+    acted: ActuatorColumns = field(default_factory=ActuatorColumns)
     # no id() of a point: one that is gone leaves its own to the next one
     passes: tuple[ref[Path], bytes, Sequence[PartPass]] | None = None
     first: tuple[ref[Path], bytes, Sequence[PartPass]] | None = None

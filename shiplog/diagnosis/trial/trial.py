@@ -225,7 +225,9 @@ class Trial:
         )  # fmt: skip
         kept = next(alike, None)
         if kept is None:
-            kept = read(ref.model, ref.setting, self.record, self.rows, dict(reading))
+            kept = read(
+                ref.model, ref.setting, self.record, self.rows, dict(reading), self.cache.acted
+            )
             self.cache.readings = [*self.cache.readings[:1], (reading, kept)]
         cut, moved, observed = kept
         return as_hypothesised(cut, causes, numbers), moved, observed
