@@ -26,6 +26,7 @@ from shiplog.diagnosis.linear.segments import Cut
 from shiplog.machine.arrays import double
 from shiplog.models.causes import Cause, Setting
 from shiplog.models.extended import Extended
+from shiplog.ship_profile.profile import Profile
 from shiplog.voyages.rows.recording import Record
 
 AVERAGING_S = 2.0  # s: a clock's column is a derivative, and its noise would pass for what it tells
@@ -113,20 +114,18 @@ def as_hypothesised(cut: Cut, causes: Sequence[Cause], numbers: Mapping[str, np.
 
 @dataclass
 class ActuatorColumns:
-    """Columns of causes that change nothing but actuators, of one record and its segments: they
-    depend on the numbers of such causes alone, and a sensor's clock leaves them as they were.
+    """Columns of causes that act by orders alone, of one record and its segments. They depend on
+    the numbers of causes on the same actuators: a sensor's clock leaves them as they were.
 
-    of      label and numbers of each cause that changes actuators, when they were worked out
-    series  number q → (d, q) → ∂u_d/∂q [S, K]
+    series  number q → label and numbers of those causes, and (d, q) → ∂u_d/∂q [S, K]
     """
 
-    of: tuple = ()
-    series: dict[int, dict[tuple[int, int], np.ndarray]] = field(default_factory=dict)
+    series: dict[int, tuple[tuple, dict[tuple[int, int], np.ndarray]]] = field(default_factory=dict)
 
-    def begin(self, of: tuple) -> None:
-        """Forget what belongs to other numbers."""
-        if of != self.of:
-            self.of, self.series = of, {}
+    def of(self, column: int, others: tuple) -> dict[tuple[int, int], np.ndarray] | None:
+        """A column that was worked out with these numbers; None where it was not."""
+        with_others, series = self.series.get(column, (None, {}))
+        return series if with_others == others else None
 
 
 def read(
@@ -153,9 +152,6 @@ def read(
     base = as_hypothesised(segments.cut(steps[-1], rows), model.causes, given)
     changed = [_apart(one, two) for one, two in itertools.pairwise(steps)]
     acting = [c for c, of in zip(model.causes, changed, strict=True) if "actuator" in of]
-    if any(cause.user for cause in acting):  # they may act by anything that was recorded
-        kept = ActuatorColumns()
-    kept.begin(tuple((c.label, np.asarray(given[c.label]).tobytes()) for c in acting))
     shape = (*base.driven.shape, len(columns.unit))
     moved: dict[tuple[int, int], np.ndarray] = {}  # (d, q) → its series
     observed = np.zeros((*base.y.shape, len(columns.unit)))
@@ -164,14 +160,18 @@ def read(
         if not cause.reads:
             continue
         before = steps[place]
-        here = given.get(cause.label, np.zeros(cause.count))
+        here = np.asarray(given.get(cause.label, np.zeros(cause.count)))
         low, high = cause.bounds(setting)
         if cause.shifts and of is not before:
             averaged, of = before.smoothed(AVERAGING_S), before
         moving = averaged if cause.shifts else before
-        for i, column in enumerate(columns.indices[cause.label]):
-            if column in kept.series:
-                moved |= kept.series[column]
+        near = [c for c in acting if _share_orders(cause, c, record.profile)]
+        # those of a cause that may act by anything that was recorded are not kept
+        alone = all(c.orders(record.profile) is not None for c in (cause, *near))
+        others = (*((c.label, np.asarray(given[c.label]).tobytes()) for c in near), here.tobytes())
+        for i, column in enumerate(columns.indices[cause.label].tolist()):
+            if alone and (series := kept.of(column, others)) is not None:
+                moved |= series
                 continue
             step = np.zeros(cause.count)
             absent = cause.first_step if here[i] == 0.0 else 0.0
@@ -183,7 +183,7 @@ def read(
             felt = _felt(_apart(more, less))
             later = [
                 c for c, of in zip(model.causes[place + 1 :], changed[place + 1 :], strict=True)
-                if of & felt or (felt and c.user)
+                if (of & felt and (felt != {"actuator"} or c in near)) or (felt and c.user)
             ]  # fmt: skip
             more, less = (corrected(later, one, given) for one in (more, less))
             differ = _apart(more, less)  # of what both share nothing changes
@@ -200,8 +200,8 @@ def read(
             if "state" in differ:
                 between = replace(more, state=more.state - less.state)
                 observed[..., column] = segments.means_of_bins(between, rows) / apart
-            if differ <= {"actuator"} and not cause.user:
-                kept.series[column] = found
+            if alone:
+                kept.series[column] = others, found
             moved |= found
     return base, Moved.of(shape, moved), observed
 
@@ -212,6 +212,12 @@ def _apart(one: Record, other: Record) -> frozenset[str]:
         name for name in ("state", "actuator", "wind")
         if getattr(one, name) is not getattr(other, name)
     )  # fmt: skip
+
+
+def _share_orders(one: Cause, other: Cause, profile: Profile) -> bool:
+    """Whether two causes may act on the same actuators."""
+    own, others = one.orders(profile), other.orders(profile)
+    return own is None or others is None or bool(own & others)
 
 
 def _felt(differ: frozenset[str]) -> frozenset[str]:

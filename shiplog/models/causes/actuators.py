@@ -18,6 +18,7 @@ from shiplog.models.causes import actuator_response as response
 from shiplog.models.causes.base import Cause, ParameterEstimate, Setting
 from shiplog.models.mmg.estimate import GRAVITY
 from shiplog.nomenclature.numbers import figure
+from shiplog.ship_profile.profile import Profile
 from shiplog.voyages.rows.recording import Record
 
 TURNING, PUSHING = ("rudder", "azimuth"), ("propeller", "thruster")
@@ -89,6 +90,9 @@ class OnUnits(Cause):
     def columns_of(self, names: Sequence[str]) -> list[int]:
         """Columns of its units among the profile's actuators."""
         return [i for i, name in enumerate(names) if name in self.units]
+
+    def orders(self, profile: Profile) -> frozenset[int]:
+        return frozenset(self.columns_of(profile.actuator_names))
 
     def reach(self, setting: Setting) -> float:
         """Largest recorded order of its units, either way."""

@@ -275,6 +275,11 @@ class Cause:
         """The true record, from the measured one: sensors corrected, actuators as they acted."""
         return record
 
+    def orders(self, profile: Profile) -> frozenset[int] | None:
+        """Actuators, by their place in the profile, whose orders are all that its `read` depends on
+        and changes; None where it may be anything that was recorded."""
+        return None
+
     def inverse(self, p: np.ndarray) -> np.ndarray:
         """The numbers whose `read` inverts this one's: from true values to measurements."""
         return -p

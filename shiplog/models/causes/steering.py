@@ -33,6 +33,9 @@ class _OnRudders(Cause):
     def _steering(self, profile: Profile) -> list[int]:
         return _columns(profile, "rudder" if self.what == "rudders" else "azimuth")
 
+    def orders(self, profile: Profile) -> frozenset[int]:
+        return frozenset(self._steering(profile))
+
     def _with(self, record: Record, acting: np.ndarray) -> Record:
         actuator = record.actuator.copy()
         actuator[:, self._steering(record.profile)] = acting
@@ -58,7 +61,8 @@ class RudderOffset(_OnRudders):
     equation = "δ = δ_recorded + offset"
     remedy = (
         "Check the rudder's zero at the dock, and correct its offset in the profile. "
-        "Then ingest these logs again."
+        "Then ingest these logs again. Where the zero is right, a side force of the screw acts "
+        "alike as long as it turns."
     )
     parameters = ()
     separated_by = {
