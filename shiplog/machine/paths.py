@@ -128,7 +128,8 @@ NO_PAGE = frozenset({".pdf", ".png", ".svg", ".md", ".json", ".rrd"})  # endings
 
 
 def check_page(path: Path, option: str) -> Path:
-    """As `check_file`, of a page: what ends as another kind of file would not open.
+    """As `check_file`, of a page: what ends as another kind of file would not open, and a name
+    without an ending gets .html, without which no browser opens it.
 
     Raises ShiplogError.
     """
@@ -137,7 +138,7 @@ def check_page(path: Path, option: str) -> Path:
             f"{option} {path} ends in {path.suffix!r}, and the page is HTML.",
             hint="end its name in .html; a browser prints it as PDF.",
         )
-    return check_file(path, option)
+    return check_file(path if path.suffix else path.with_suffix(".html"), option)
 
 
 def check_run(path: Path) -> None:

@@ -249,7 +249,8 @@ def test_a_share_is_said_once_where_it_is_the_same():
 def test_a_page_is_not_written_as_what_it_is_not(tmp_path, name):
     with pytest.raises(ShiplogError, match="the page is HTML"):
         paths.check_page(tmp_path / name, "--out")
-    assert paths.check_page(tmp_path / "x.html", "--out") == tmp_path / "x.html"
+    for given in ("x", "x.html"):
+        assert paths.check_page(tmp_path / given, "--out") == tmp_path / "x.html"
 
 
 def test_a_recorder_without_a_date_has_none():
