@@ -423,12 +423,14 @@ def export_run(
     *,
     voyages: Names = (),
     causes: Files = (),
+    simulators: Files = (),
 ) -> Exported:
     """A run in a file of another program, loaded again by that program and compared.
 
     to       one of `shiplog.export.targets.TARGETS`
     out      the file; the run's name here unless given
     store    of the voyages whose predictions are wanted, with `voyages`
+    simulators   as for `load`; an FMU goes into the FMU that is written
 
     Raises ShiplogError.
     """
@@ -439,7 +441,7 @@ def export_run(
 
     target = targets.of_name(to)
     (path,) = _runs(run)
-    opened = simulating.load(path, _files(causes))
+    opened = simulating.load(path, _files(causes), _given(simulators))
     file = check_file(Path(out or f"{opened.name}{target.ending}"), "out")
     of = None if store is None else Store(_path(store))
     return exporting.export_run(opened, to, file, of, _names(voyages))

@@ -10,6 +10,7 @@ as sums they would be a hundred thousand operations.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,7 +31,7 @@ MOST_READ = 10_000_000  # a network's weights are nodes while it is read
 @dataclass(frozen=True)
 class Equations:
     """graph      its varying inputs are x, u and ω in this order, its fixed ones θ
-    outputs    [3] nodes of ν̇
+    outputs    [3] nodes of ν̇; of causes around a simulator of others, [5], with V behind
     matrices   [m, k] of the products in it
     actuators  A
     count      of the coefficients"""
@@ -46,13 +47,18 @@ class Equations:
         return STATES + self.actuators + WIND
 
 
-def of_model(model: Any, count: int, actuators: int, share: bool) -> Equations:
+def of_model(
+    model: Any, count: int, actuators: int, share: bool,
+    water: Callable[[Any], tuple[Any, Any]] | None = None,
+) -> Equations:  # fmt: skip
     """Equations of a model with `count` coefficients. Raises ModelError for one of which no code
     can be made.
 
     share   whether its last actuator column is the share of the campaign: 1, its end, as a
             simulation has it
+    water   of the coefficients θ, V along x₀ and y₀: two outputs more
     """
+    from shiplog.machine.arrays import jnp
     from shiplog.simulation.kernel import from_jaxpr
 
     leaves, structure = trees.flatten(model)
@@ -60,7 +66,10 @@ def of_model(model: Any, count: int, actuators: int, share: bool) -> Equations:
 
     def acceleration(theta, state, actuator, wind):
         whole = trees.unflatten(structure, leaves)
-        return whole.acceleration(theta, state, actuator, wind)
+        found = whole.acceleration(theta, state, actuator, wind)
+        if water is None:
+            return found
+        return jnp.concatenate((found, jnp.stack([jnp.asarray(one) for one in water(theta)])))
 
     graph, matrices = Graph(), []
 

@@ -72,7 +72,22 @@ def description(path: Path) -> dict[str, Any]:
     return {
         "name": path.name, "version": found.fmiVersion, "tool": found.generationTool or "",
         "step": min(float(step), 1.0), "variables": variables,
-        "exchange": found.coSimulation is None,
+        "exchange": found.coSimulation is None, "unit": _unit(found),
+    }  # fmt: skip
+
+
+def _unit(found: Any) -> dict[str, Any]:
+    """What C needs in order to call it: `export.given_unit` puts it into another FMU."""
+    kind = found.coSimulation or found.modelExchange
+    states = [] if found.coSimulation is not None else [d.variable for d in found.derivatives]
+    return {
+        "token": found.guid, "identifier": kind.modelIdentifier,
+        "once": bool(kind.canBeInstantiatedOnlyOncePerProcess),
+        "tool": bool(kind.needsExecutionTool),
+        "inner": float(getattr(kind, "fixedInternalStepSize", None) or 0.0),
+        "references": {v.name: v.valueReference for v in found.modelVariables},
+        "whole": [v.name for v in found.modelVariables if str(v.type) in ("Integer", "Int32")],
+        "states": [one.derivative.name for one in states],
     }  # fmt: skip
 
 

@@ -86,10 +86,26 @@ EXPORT fmi2Component FMI2(fmi2Instantiate)(fmi2String name, fmi2Type type, fmi2S
         free(c);
         return NULL;
     }
+#ifdef GIVEN
+    {
+        char said[200];
+        c->now.parameters.given = given_open(resources, said);
+        if (c->now.parameters.given == NULL) {
+            say(c, fmi2Error, said);
+            free(c);
+            return NULL;
+        }
+    }
+#endif
     return c;
 }
 
-EXPORT void FMI2(fmi2FreeInstance)(fmi2Component c) { free(c); }
+EXPORT void FMI2(fmi2FreeInstance)(fmi2Component c) {
+#ifdef GIVEN
+    if (c) given_close(((component *)c)->now.parameters.given);
+#endif
+    free(c);
+}
 
 EXPORT fmi2Status FMI2(fmi2SetupExperiment)(fmi2Component c, fmi2Boolean toleranceDefined,
                                             fmi2Real tolerance, fmi2Real start,
@@ -186,7 +202,7 @@ EXPORT fmi2Status FMI2(fmi2GetFMUstate)(fmi2Component c, fmi2FMUstate *state) {
 }
 
 EXPORT fmi2Status FMI2(fmi2SetFMUstate)(fmi2Component c, fmi2FMUstate state) {
-    memcpy(&((component *)c)->now, state, sizeof(memory));
+    memory_copy(&((component *)c)->now, (const memory *)state);
     return fmi2OK;
 }
 

@@ -82,6 +82,17 @@ EXPORT fmi3Instance FMI3(fmi3InstantiateCoSimulation)(
         free(c);
         return NULL;
     }
+#ifdef GIVEN
+    {
+        char said[200];
+        c->now.parameters.given = given_open(resources, said);
+        if (c->now.parameters.given == NULL) {
+            say(c, fmi3Error, said);
+            free(c);
+            return NULL;
+        }
+    }
+#endif
     return c;
 }
 
@@ -116,7 +127,12 @@ EXPORT fmi3Instance FMI3(fmi3InstantiateScheduledExecution)(
     return NULL;
 }
 
-EXPORT void FMI3(fmi3FreeInstance)(fmi3Instance c) { free(c); }
+EXPORT void FMI3(fmi3FreeInstance)(fmi3Instance c) {
+#ifdef GIVEN
+    if (c) given_close(((component *)c)->now.parameters.given);
+#endif
+    free(c);
+}
 
 EXPORT fmi3Status FMI3(fmi3EnterInitializationMode)(fmi3Instance c, fmi3Boolean toleranceDefined,
                                                     fmi3Float64 tolerance, fmi3Float64 start,
@@ -208,7 +224,7 @@ EXPORT fmi3Status FMI3(fmi3GetFMUState)(fmi3Instance c, fmi3FMUState *state) {
 }
 
 EXPORT fmi3Status FMI3(fmi3SetFMUState)(fmi3Instance c, fmi3FMUState state) {
-    memcpy(&((component *)c)->now, state, sizeof(memory));
+    memory_copy(&((component *)c)->now, (const memory *)state);
     return fmi3OK;
 }
 
