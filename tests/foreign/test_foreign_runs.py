@@ -16,6 +16,7 @@ from shiplog.exceptions import RunError, UsageError
 from shiplog.foreign.source import SimulatorError
 from shiplog.logs.conversion.write import Series, write_log
 from shiplog.models.causes import CATALOGUE
+from shiplog.planning.plan import CannotPlan
 from shiplog.training.runs import foreign_run, load_model
 from shiplog.voyages.ingest.ingest import ingest
 from shiplog.voyages.store.store import Store
@@ -159,4 +160,7 @@ def test_the_command_line(store, tmp_path):
     sailed = invoke(app, ["simulate", str(run), "--zigzag", "10/10", "--members", "1",
                           "--simulator", str(file)])  # fmt: skip
     assert sailed.exit_code == 0, sailed.output
+    planned = invoke(app, ["plan", str(run), *where, "--simulator", str(file)])
+    assert isinstance(planned.exception, CannotPlan)
+    assert "--causes-only" in str(planned.exception.hint)
     foreign_run.close()

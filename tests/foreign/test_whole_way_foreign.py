@@ -8,6 +8,7 @@ import fmus
 import pytest
 
 from shiplog.commands.diagnose import diagnose_run
+from shiplog.commands.plan import plan_run
 from shiplog.commands.train_foreign import Given, foreign_command
 from shiplog.ship_profile import file as profiles
 from shiplog.training.runs import foreign_run, load_model
@@ -76,3 +77,13 @@ def test_season_2_has_its_causes_with_their_sizes(run):
 
 def test_season_3_has_none(run):
     assert diagnosed(run, 3).verdict.as_json()["verdict"] == "none"
+
+
+def test_plan_tells_its_causes_apart(run, tmp_path):
+    """A standard zigzag of the simulator itself shows a current, and tells it from an antenna."""
+    path, store, file = run
+    found = plan_run(path, store, tmp_path / "plan", causes_only=True, simulators=[str(file)])
+    zigzag = found.apart["zigzag 20/20"]
+    alike = {frozenset((one.a, one.b)) for one in zigzag.twins}
+    assert "current" not in zigzag.unseen
+    assert frozenset(("current", "antenna_offset")) not in alike
