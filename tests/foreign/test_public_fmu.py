@@ -74,6 +74,7 @@ def test_a_heading_that_does_not_turn_with_the_yaw_rate_is_no_ships(store, sprin
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.long
 def test_it_runs_to_its_end_and_evaluate_refuses_it(store, springs, tmp_path):
     """Loaded, mapped, reset before each window and stepped: v' = -k x, whatever a ship does."""
     out = tmp_path / "run"
