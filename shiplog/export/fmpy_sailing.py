@@ -128,9 +128,9 @@ def serve(pipe: Connection) -> None:
     """In the child: one request."""
     confine()
     head, (start, water, orders) = worker.receive(pipe)
-    path = Path(head.pop("path"))
-    del head["shapes"]
-    names = Names(**{k: tuple(v) if isinstance(v, list) else v for k, v in head.items()})
+    path = Path(head["path"])
+    places, state, actuators = (tuple(head[n]) for n in ("places", "state", "actuators"))
+    names = Names(places, state, actuators, float(head["step"]))
     try:
         worker.send(pipe, {}, [sail(path, names, start, water.tolist(), orders)])
     except NotLoaded as error:

@@ -111,7 +111,7 @@ def slopes(
     extra = rollouts.row_slopes(rest_of(model), theta, np.concatenate((state, driven), 1))
     if extra is None:
         extra = _by_jax(rest_of(model), theta, state, driven)
-    return tuple(  # type: ignore[return-value]
+    return tuple(  # type: ignore[return-value]  # four, as `extra` has
         one + other
         for one, other in zip((middle, by_state, by_driven, by_theta), extra, strict=True)
     )

@@ -54,6 +54,13 @@ static void memory_copy(memory *to, const memory *from) {
 #endif
 }
 
+/* A state that an importer keeps, in memory that is taken where there is none. 0 where none is left. */
+static int memory_kept(void **to, const void *from) {
+    if (*to == NULL) *to = malloc(sizeof(memory));
+    if (*to != NULL) memcpy(*to, from, sizeof(memory));
+    return *to != NULL;
+}
+
 static void memory_reset(memory *m) {
     static const memory nothing;
     memory_copy(m, &nothing);

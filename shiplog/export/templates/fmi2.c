@@ -195,9 +195,8 @@ NONE(fmi2GetString, fmi2String, )
 NONE(fmi2SetString, fmi2String, const)
 
 EXPORT fmi2Status FMI2(fmi2GetFMUstate)(fmi2Component c, fmi2FMUstate *state) {
-    if (*state == NULL) *state = malloc(sizeof(memory));
-    if (*state == NULL) return say((component *)c, fmi2Error, "no memory is left");
-    memcpy(*state, &((component *)c)->now, sizeof(memory));
+    if (!memory_kept(state, &((component *)c)->now))
+        return say((component *)c, fmi2Error, "no memory is left");
     return fmi2OK;
 }
 
@@ -231,10 +230,7 @@ EXPORT fmi2Status FMI2(fmi2SerializeFMUstate)(fmi2Component c, fmi2FMUstate stat
 EXPORT fmi2Status FMI2(fmi2DeSerializeFMUstate)(fmi2Component c, const fmi2Byte bytes[],
                                                 size_t size, fmi2FMUstate *state) {
     if (size != sizeof(memory)) return say((component *)c, fmi2Error, "no state of this FMU");
-    if (*state == NULL) *state = malloc(sizeof(memory));
-    if (*state == NULL) return say((component *)c, fmi2Error, "no memory is left");
-    memcpy(*state, bytes, sizeof(memory));
-    return fmi2OK;
+    return memory_kept(state, bytes) ? fmi2OK : say((component *)c, fmi2Error, "no memory is left");
 }
 
 EXPORT fmi2Status FMI2(fmi2GetDirectionalDerivative)(

@@ -217,9 +217,8 @@ EXPORT fmi3Status FMI3(fmi3SetBoolean)(fmi3Instance c, const fmi3ValueReference 
 }
 
 EXPORT fmi3Status FMI3(fmi3GetFMUState)(fmi3Instance c, fmi3FMUState *state) {
-    if (*state == NULL) *state = malloc(sizeof(memory));
-    if (*state == NULL) return say(c, fmi3Error, "no memory is left");
-    memcpy(*state, &((component *)c)->now, sizeof(memory));
+    if (!memory_kept(state, &((component *)c)->now))
+        return say(c, fmi3Error, "no memory is left");
     return fmi3OK;
 }
 
@@ -253,10 +252,7 @@ EXPORT fmi3Status FMI3(fmi3SerializeFMUState)(fmi3Instance c, fmi3FMUState state
 EXPORT fmi3Status FMI3(fmi3DeserializeFMUState)(fmi3Instance c, const fmi3Byte bytes[], size_t size,
                                                 fmi3FMUState *state) {
     if (size != sizeof(memory)) return say(c, fmi3Error, "no state of this FMU");
-    if (*state == NULL) *state = malloc(sizeof(memory));
-    if (*state == NULL) return say(c, fmi3Error, "no memory is left");
-    memcpy(*state, bytes, sizeof(memory));
-    return fmi3OK;
+    return memory_kept(state, bytes) ? fmi3OK : say(c, fmi3Error, "no memory is left");
 }
 
 EXPORT fmi3Status FMI3(fmi3EnterStepMode)(fmi3Instance c) {
