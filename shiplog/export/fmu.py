@@ -28,6 +28,8 @@ from shiplog.export import (
     fmpy_sailing,
     fmu_description,
     fmu_variables,
+    given_simulator,
+    given_trial,
     given_unit,
 )
 from shiplog.export.filled import filled, inert
@@ -65,6 +67,8 @@ def losses_of(job: Job, version: str) -> tuple[str, ...]:
             else:
                 (lacking if compilers.for_system(system) is None else there).append(folder)
     found = list(job.ship.losses)
+    if (around := given_simulator.asked(job.run)) is not None:
+        found.append(given_trial.on_its_own(around, job.trial))
     if unit is not None and nothing:
         found.append(f"Libraries for {listed(nothing)}: {unit.source.name} has none itself.")
     if there:

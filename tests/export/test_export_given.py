@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 import runpy
 import shutil
 import zipfile
@@ -55,6 +56,10 @@ def test_it_sails_as_simulate_does(caused, kind, to, tmp_path):
         assert any("takes its function as an argument" in one for one in answer["not_in_it"])
         return
     assert any("as you gave it in this call" in one for one in answer["not_in_it"])
+    # its own step of 0.05 s against one of 1 s, and no states besides the ship's
+    (by_itself,) = [one for one in answer["not_in_it"] if "goes on by itself" in one]
+    metres, degrees = map(float, re.findall(r"([\d.]+) (?:m|deg)\b", by_itself)[:2])
+    assert 0.01 < metres < 3.0 and 0.01 < degrees < 3.0
     with zipfile.ZipFile(tmp_path / "ship.fmu") as whole, zipfile.ZipFile(file) as given:
         for name in given.namelist():
             assert whole.read(f"resources/given/{name}") == given.read(name)
