@@ -69,6 +69,8 @@ def losses_of(job: Job, version: str) -> tuple[str, ...]:
     found = list(job.ship.losses)
     if (around := given_simulator.asked(job.run)) is not None:
         found.append(given_trial.on_its_own(around, job.trial))
+    if unit is not None and unit.facts["tool"]:
+        found.append(f"The program that {unit.source.name} needs at run time, as it says.")
     if unit is not None and nothing:
         found.append(f"Libraries for {listed(nothing)}: {unit.source.name} has none itself.")
     if there:

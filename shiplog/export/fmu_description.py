@@ -31,7 +31,7 @@ def fmi2(ship: Ship, variables: Sequence[Variable], token: str, about: str) -> s
         "generationTool": ship.author, "variableNamingConvention": "structured",
     })  # fmt: skip
     kind = xml.SubElement(
-        root, "CoSimulation", {"modelIdentifier": ship.identifier, **CAN_2, **_once(ship)}
+        root, "CoSimulation", {"modelIdentifier": ship.identifier, **CAN_2, **_asked(ship)}
     )
     xml.SubElement(xml.SubElement(kind, "SourceFiles"), "File", {"name": "fmi2.c"})
     _units(root, variables, "BaseUnit")
@@ -66,7 +66,7 @@ def fmi3(ship: Ship, variables: Sequence[Variable], token: str, about: str) -> s
         "description": about, "generationTool": ship.author,
         "variableNamingConvention": "structured",
     })  # fmt: skip
-    can = CAN_3 | _once(ship)
+    can = CAN_3 | _asked(ship)
     xml.SubElement(root, "CoSimulation", {"modelIdentifier": ship.identifier, **can})
     _units(root, variables, "BaseUnit")
     logging = xml.SubElement(root, "LogCategories")
@@ -151,10 +151,15 @@ def _causality(one: Variable) -> dict[str, str]:
     return {"causality": "parameter", "variability": "fixed" if one.role == FIXED else "tunable"}
 
 
-def _once(ship: Ship) -> dict[str, str]:
-    """Where an FMU is inside of which a process may have one instance only."""
-    once = ship.unit is not None and ship.unit.once
-    return {"canBeInstantiatedOnlyOncePerProcess": "true"} if once else {}
+def _asked(ship: Ship) -> dict[str, str]:
+    """What an FMU that is inside asks of its importer: one instance in a process, or its tool."""
+    if ship.unit is None:
+        return {}
+    asked = {
+        "canBeInstantiatedOnlyOncePerProcess": ship.unit.facts["once"],
+        "needsExecutionTool": ship.unit.facts["tool"],
+    }
+    return {name: "true" for name, needed in asked.items() if needed}
 
 
 def _unit(unit: str) -> dict[str, str]:

@@ -48,11 +48,6 @@ class Unit:
     mapping: Mapping[str, Any]
     actuators: tuple[str, ...]
 
-    @property
-    def once(self) -> bool:
-        """Whether a process may have one instance only."""
-        return bool(self.facts["once"])
-
     @cached_property
     def content(self) -> dict[str, bytes]:
         """Name → bytes of each of its files. Raises UnreadableError for names that leave it, and

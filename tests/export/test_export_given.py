@@ -23,7 +23,6 @@ GEAR = {
     "rudder_lag": [1.3], "rudder_delay": [1.7],
 }  # fmt: skip
 SAME = 1e-9  # m, m/s, rad: the layer has the form of `simulate`, so only rounding differs
-LONG = pytest.mark.long
 
 
 def exported(run, file, to, out):
@@ -37,11 +36,12 @@ def exported(run, file, to, out):
     return answer, text
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("kind", "to"),
     [
-        ("fmu", "fmu"), pytest.param("function", "python", marks=LONG),
-        pytest.param("fmu3", "fmu3", marks=LONG), pytest.param("exchange", "fmu3", marks=LONG),
+        ("fmu", "fmu"), ("fmu3", "fmu3"), ("function", "python"),
+        pytest.param("exchange", "fmu3", marks=pytest.mark.nightly),
     ],
 )  # fmt: skip
 def test_it_sails_as_simulate_does(caused, kind, to, tmp_path):
@@ -56,7 +56,7 @@ def test_it_sails_as_simulate_does(caused, kind, to, tmp_path):
         assert any("takes its function as an argument" in one for one in answer["not_in_it"])
         return
     assert any("as you gave it in this call" in one for one in answer["not_in_it"])
-    # its own step of 0.05 s against one of 1 s, and no states besides the ship's
+    # its own step of 0.02 s against one of 1 s, and no states besides the ship's
     (by_itself,) = [one for one in answer["not_in_it"] if "goes on by itself" in one]
     metres, degrees = map(float, re.findall(r"([\d.]+) (?:m|deg)\b", by_itself)[:2])
     assert 0.01 < metres < 3.0 and 0.01 < degrees < 3.0
