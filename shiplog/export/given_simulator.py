@@ -37,7 +37,6 @@ class Function:
 
     returns  "derivative", "acceleration" or "next state", `step` s later
     layout   "rows", "columns" or "row by row": how it takes many at once
-    library  of the arrays that it takes
     wind     whether its inputs end with the apparent wind
     """
 

@@ -14,6 +14,7 @@ from shiplog.export.equations import Equations
 from shiplog.export.given_simulator import Function
 from shiplog.export.given_unit import Unit
 from shiplog.simulation.controls import FASTEST, STEERING_CAUSES
+from shiplog.training.runs import foreign_run
 from shiplog.training.runs.load_model import ForeignRun, Run
 from shiplog.training.runs.sailing_run import Sailor
 
@@ -190,9 +191,10 @@ def _losses(run: Run, sailor: Sailor) -> tuple[str, ...]:
     around = given_simulator.asked(run)
     found = [] if around is None else list(given_simulator.losses(around))
     if isinstance(run, ForeignRun) and run.logged:
+        left = float(np.median(foreign_run.kept(run).misfit))
         found.append(
             f"{run.config.foreign.name} itself, which was logged: an MMG that was fitted to its "
-            "accelerations stands in."
+            f"accelerations stands in, and leaves {left:.0%} of them."
         )
     if sailor.ignored:
         found.append(

@@ -116,6 +116,19 @@ def test_what_was_logged_is_a_run(store, tmp_path):
                                    "propeller": [5.0, 5.0]}))  # fmt: skip
 
 
+def test_what_was_logged_has_no_model_to_write(store, tmp_path):
+    given = Given(f"logs:{TOPIC}", logs=(store.path.parent,))
+    trained(store, tmp_path / "run", given)
+    write = ["export", str(tmp_path / "run"), "--out", str(tmp_path / "x")]
+    refused = CliRunner().invoke(app, [*write, "--to", "cpp"])
+    assert "has no model to write" in str(refused.exception)
+    where = ["--to", "csv", "--store", str(store.path), "--voyages", "second"]
+    done = CliRunner().invoke(app, [*write, *where])
+    assert done.exit_code == 0, done.exception
+    rows = pl.read_csv(tmp_path / "x")
+    assert (rows["surge"] - rows["measured_surge"]).mean() == pytest.approx(0.05, abs=5e-3)
+
+
 def test_a_poor_stand_in_changes_no_ship(store, tmp_path):
     """It leaves 60 % of the accelerations: sensors, current and forces are tested all the same."""
     file = tmp_path / "given.py"
