@@ -36,7 +36,7 @@ LONGEST = 200  # letters of a token or of a library's name
 
 @dataclass(frozen=True)
 class Unit:
-    """facts    of `foreign.fmu.description`: token, identifier, value references, ...
+    """facts    of `foreign.fmu_file.description`: token, identifier, value references, ...
     mapping  which of its variables is which channel, with factors to SI
     actuators  of the ship, in the profile's order
     """

@@ -14,8 +14,10 @@ import pytest
 import tanker
 from commands import call
 
-from shiplog.export import fmu, python_file
+from shiplog.exceptions import UnreadableError
+from shiplog.export import fmu, given_unit, python_file
 from shiplog.export.job import Job
+from shiplog.foreign.source import Source
 from shiplog.training.runs import load_model
 
 GEAR = {
@@ -234,3 +236,20 @@ def test_numbers_and_predictions_of_it(caused, sailed, tmp_path):
     code, text, said = call("export", run, "--to", "parquet", "--out", out, *given,
                             "--simulator", file)  # fmt: skip
     assert code == 0 and "differs by 0 at most" in text, said
+
+
+def test_files_of_a_strangers_archive_stay_in_it(tmp_path):
+    file = tmp_path / "odd.fmu"
+    with zipfile.ZipFile(file, "w") as odd:
+        odd.writestr("modelDescription.xml", "")
+        odd.writestr("../evil.txt", "")
+
+    def unit(sha256):
+        source = Source(file, "fmu", "", sha256)
+        return given_unit.Unit(source, 2, False, {}, {}, ())
+
+    with pytest.raises(UnreadableError, match="which is outside of it"):
+        _ = unit(hashlib.sha256(file.read_bytes()).hexdigest()).content
+    with pytest.raises(UnreadableError, match="was changed meanwhile"):
+        _ = unit("0" * 64).content
+    assert re.fullmatch(r"[\w.{}\\-]*", given_unit._text('{a-1}"; */ @NAME@\n\\ü').replace(" ", ""))
