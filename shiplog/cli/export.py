@@ -9,7 +9,7 @@ import typer
 
 from shiplog.cli import completion
 from shiplog.cli.inputs import check_voyages
-from shiplog.cli.options import CHOSEN, STORE, Causes, JsonOption, StoreOption
+from shiplog.cli.options import CHOSEN, STORE, Causes, JsonOption, Simulators, StoreOption
 from shiplog.cli.output import LOST, answer
 from shiplog.export.targets import PREDICTIONS, TARGETS, of_name, refuse_voyages
 
@@ -42,6 +42,7 @@ def export(
         typer.Option(metavar="FILE", help="The file; the run's name here unless given."),
     ] = None,
     cause: Causes = None,
+    simulator: Simulators = None,
     json_to: JsonOption = None,
 ) -> None:
     """A run in the files of other simulators and tools.
@@ -68,9 +69,8 @@ def export(
         from shiplog.commands.export import export_run
         from shiplog.commands.simulate import load
         from shiplog.voyages.store.store import Store
-    done = export_run(
-        load(run, cause or []), to, path, Store(store) if predicts else None, voyages or ()
-    )
+    opened = load(run, cause or [], simulator or [])
+    done = export_run(opened, to, path, Store(store) if predicts else None, voyages or ())
     answer(done, json_to)
     if not done.complete:
         raise typer.Exit(LOST)

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from shiplog.cli import completion
-from shiplog.cli.options import STORE, JsonOption, StoreOption
+from shiplog.cli.options import STORE, JsonOption, Simulators, StoreOption
 from shiplog.cli.output import answer
 from shiplog.exceptions import UsageError
 
@@ -72,6 +72,7 @@ def plan(
     out: Annotated[
         Path | None, typer.Option(help="Folder of the plan; RUN/plan unless given.")
     ] = None,
+    simulator: Simulators = None,
     json_to: JsonOption = None,
 ) -> None:
     """The manoeuvre to sail next, and what it would show.
@@ -106,6 +107,7 @@ def plan(
             run, Store(store), out, seconds=seconds,
             rudder=None if rudder is None else math.radians(rudder), speed=within, room=room,
             water=expected, seed=seed, causes_only=causes_only, with_causes=not no_causes,
+            simulators=simulator or [],
         ),
         json_to,
     )  # fmt: skip

@@ -423,12 +423,14 @@ def export_run(
     *,
     voyages: Names = (),
     causes: Files = (),
+    simulators: Files = (),
 ) -> Exported:
     """A run in a file of another program, loaded again by that program and compared.
 
     to       one of `shiplog.export.targets.TARGETS`
     out      the file; the run's name here unless given
     store    of the voyages whose predictions are wanted, with `voyages`
+    simulators   as for `load`; an FMU goes into the FMU that is written
 
     Raises ShiplogError.
     """
@@ -439,7 +441,7 @@ def export_run(
 
     target = targets.of_name(to)
     (path,) = _runs(run)
-    opened = simulating.load(path, _files(causes))
+    opened = simulating.load(path, _files(causes), _given(simulators))
     file = check_file(Path(out or f"{opened.name}{target.ending}"), "out")
     of = None if store is None else Store(_path(store))
     return exporting.export_run(opened, to, file, of, _names(voyages))
@@ -457,6 +459,7 @@ def plan(
     wind: tuple[float, float] | None = None,
     causes_only: bool = False,
     seed: int = 0,
+    simulators: Files = (),
 ) -> Planned:
     """What to sail next: the manoeuvre that says most about a run's coefficients within the
     limits, how narrow their intervals will be, and which causes it tells apart. Written to `out`,
@@ -466,6 +469,7 @@ def plan(
     speed        m/s between which the ship keeps
     room         m of water ahead and aside
     wind         that is expected: m/s, and deg clockwise from x₀ that it comes from
+    simulators   as for `load`; of a run of one, with `causes_only`
 
     Raises ShiplogError.
     """
@@ -477,7 +481,7 @@ def plan(
         path, Store(_path(store)), None if out is None else Path(out), seconds=seconds,
         rudder=None if rudder_deg is None else math.radians(rudder_deg), speed=speed, room=room,
         water=None if wind is None else Water(wind=from_direction(*wind)), seed=seed,
-        causes_only=causes_only,
+        causes_only=causes_only, simulators=_given(simulators),
     )  # fmt: skip
 
 

@@ -31,8 +31,8 @@ from shiplog.simulation import coverage as covering
 from shiplog.simulation.better_model import Better, better
 from shiplog.simulation.residual_tests import MOST_ROWS, ResidualTest, residual_tests
 from shiplog.simulation.rollout import simulate
-from shiplog.training.runs import load_model, trust_file
-from shiplog.training.runs.load_model import Run
+from shiplog.training.runs import foreign_run, load_model, trust_file
+from shiplog.training.runs.load_model import ForeignRun, Run
 from shiplog.training.runs.run_checks import (
     refuse_no_window,
     refuse_other_columns,
@@ -92,6 +92,9 @@ def evaluate_runs(
         scores = {seed: scoring.score(model, cut) for seed, model in models.items()}
         scored += [(run, seed, one) for seed, one in scores.items()]
         bands[run.name] = _half_widths(run, models, scores, cut)
+    for run, _, one in scored:
+        if isinstance(run, ForeignRun):
+            foreign_run.refuse_no_ship(run, one.errors["loss"].to_numpy(), cut)
     reach("coverage")
     covered = _coverage(first, rows, numbered, size)
     reach("forces")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -50,14 +51,16 @@ def plan_run(
     seed: int = 0,
     causes_only: bool = False,
     with_causes: bool = True,
+    simulators: Sequence[str] = (),
 ) -> Planned:
     """The manoeuvre within the limits (`limits.limits`) that says most about the run's
     coefficients, and which causes it tells apart. Raises ShiplogError.
 
     room    m of water ahead and aside
     water   wind and current that are expected; the training voyages' mean wind unless given
+    simulators   files of simulators of the user's own: the run may be one of these
     """
-    run = load_model.load(path)
+    run = load_model.load(path, simulators=simulators)
     physical = None if causes_only else plan.refuse_unplannable(run)
     sailor = sailing_run.of_run(run)
     water = Water(wind=noise.usual_wind(run)) if water is None else water

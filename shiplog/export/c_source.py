@@ -44,8 +44,11 @@ def header(ship: Ship, record: Sequence[str]) -> str:
         "SHARE": repr(1.0 - math.exp(-ship.step / ship.lag) if ship.lag > 0.0 else 1.0),
         "HEUN": str(int(ship.heun)), "LIMIT_SURGE": C.number(ship.limits[0]),
         "LIMIT_SWAY": C.number(ship.limits[1]), "LIMIT_YAW": C.number(ship.limits[2]),
+        "WATER": ", ".join(made.outputs[3:]),
+        "GIVEN_PARAMETER": ", struct given *given" if ship.unit else "",
+        "GIVEN_ARGUMENT": ", p->given" if ship.unit else "",
     }  # fmt: skip
-    return filled("ship.h", words)
+    return filled("ship.h", words, given=ship.unit is not None)
 
 
 def _places(ship: Ship) -> str:

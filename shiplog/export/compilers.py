@@ -75,11 +75,14 @@ def for_system(system: System) -> list[str] | None:
     return None if cross is None else [*cross, "-target", system.triple]
 
 
-def shared(command: Sequence[str], source: Path, out: Path, system: System) -> None:
-    """A shared library of one C file, without a path of this machine in it. Raises ShiplogError."""
+def shared(
+    command: Sequence[str], source: Path, out: Path, system: System, more: Sequence[str] = ()
+) -> None:
+    """A shared library of one C file, without a path of this machine in it; `more` are libraries
+    that it needs. Raises ShiplogError."""
     out.parent.mkdir(parents=True, exist_ok=True)
     strip = [] if "darwin" in system.fmi3 else ["-s"]
-    libraries = [] if "windows" in system.fmi3 else ["-lm"]
+    libraries = list(more) if "windows" in system.fmi3 else ["-lm", *more]
     plain = [o for o in OPTIONS if o != "-fPIC" or "windows" not in system.fmi3]
     words = [*command, *plain, "-shared", *strip, "-o", out.name, source.name, *libraries]
     run(words, source.parent, patience=PATIENCE if len(command) == 1 else FIRST_PATIENCE)

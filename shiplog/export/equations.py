@@ -10,6 +10,7 @@ as sums they would be a hundred thousand operations.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,16 +22,68 @@ from shiplog.simulation.kernel.graph import Graph, UnknownOperation
 
 STATES = 6
 WIND = 2
+ATAN2 = "atan2"
+LEAST_SQUARE = 1e-290  # of components: below, their square has lost digits
 DOT = "dot"  # (dot, matrix, row, operands …): a row of a known matrix times the operands
 LEAST_PRODUCT = 512  # multiplications from which on a product stays one: below, scalars are faster
 MOST_NODES = 60_000  # a source of so many operations still compiles within seconds
 MOST_READ = 10_000_000  # a network's weights are nodes while it is read
 
 
+class WithoutAngles(Graph):
+    """Sines and cosines of an angle A ± T, T = atan2(y, x), by components, which cost a root and a
+    division where T, sin and cos cost three calls of the C library:
+
+        cos T = x / h, sin T = y / h, h = √(x² + y²),   sin(A ± T) = sin A cos T ± cos A sin T, ...
+    """
+
+    def apply(self, kind: str, *operands: int) -> int:
+        if kind in ("sin", "cos"):
+            found = self._by_components(kind, operands[0])
+            if found is not None:
+                return found
+        return super().apply(kind, *operands)
+
+    def _by_components(self, kind: str, node: int) -> int | None:
+        how, *rest = self.nodes[node]
+        if how == ATAN2:
+            return self._of_angle(node)[0 if kind == "cos" else 1]
+        if how not in ("add", "sub"):
+            return None
+        turned = [self.nodes[one][0] == ATAN2 for one in rest]
+        if turned.count(True) != 1:
+            return None
+        first, second = (
+            self._of_angle(one) if own else (super(WithoutAngles, self).apply("cos", one),
+                                             super(WithoutAngles, self).apply("sin", one))
+            for one, own in zip(rest, turned, strict=True)
+        )  # fmt: skip
+        if kind == "cos":  # of a sum: a minus, of a difference a plus
+            one, other = self.mul(first[0], second[0]), self.mul(first[1], second[1])
+            return self.sub(one, other) if how == "add" else self.add(one, other)
+        one, other = self.mul(first[1], second[0]), self.mul(first[0], second[1])
+        return self.add(one, other) if how == "add" else self.sub(one, other)
+
+    def _of_angle(self, node: int) -> tuple[int, int]:
+        """cos T and sin T; of T = atan2(0, 0) = 0, and of what is as small, 1 and 0."""
+        _, y, x = self.nodes[node]
+        square = self.add(self.mul(x, x), self.mul(y, y))
+        least = self.const(LEAST_SQUARE)
+        there = self.apply("gt", square, least)
+        length = self.apply("sqrt", self.apply("max", square, least))
+        scale = self.apply("div", self.const(1.0), length)
+        found = ((x, 1.0), (y, 0.0))
+        cos, sin = (
+            self.apply("select", there, self.mul(one, scale), self.const(none))
+            for one, none in found
+        )
+        return cos, sin
+
+
 @dataclass(frozen=True)
 class Equations:
     """graph      its varying inputs are x, u and ω in this order, its fixed ones θ
-    outputs    [3] nodes of ν̇
+    outputs    [3] nodes of ν̇; of causes around a simulator of others, [5], with V behind
     matrices   [m, k] of the products in it
     actuators  A
     count      of the coefficients"""
@@ -46,13 +99,18 @@ class Equations:
         return STATES + self.actuators + WIND
 
 
-def of_model(model: Any, count: int, actuators: int, share: bool) -> Equations:
+def of_model(
+    model: Any, count: int, actuators: int, share: bool,
+    water: Callable[[Any], tuple[Any, Any]] | None = None,
+) -> Equations:  # fmt: skip
     """Equations of a model with `count` coefficients. Raises ModelError for one of which no code
     can be made.
 
     share   whether its last actuator column is the share of the campaign: 1, its end, as a
             simulation has it
+    water   of the coefficients θ, V along x₀ and y₀: two outputs more
     """
+    from shiplog.machine.arrays import jnp
     from shiplog.simulation.kernel import from_jaxpr
 
     leaves, structure = trees.flatten(model)
@@ -60,9 +118,12 @@ def of_model(model: Any, count: int, actuators: int, share: bool) -> Equations:
 
     def acceleration(theta, state, actuator, wind):
         whole = trees.unflatten(structure, leaves)
-        return whole.acceleration(theta, state, actuator, wind)
+        found = whole.acceleration(theta, state, actuator, wind)
+        if water is None:
+            return found
+        return jnp.concatenate((found, jnp.stack([jnp.asarray(one) for one in water(theta)])))
 
-    graph, matrices = Graph(), []
+    graph, matrices = WithoutAngles(), []
 
     class Reader(from_jaxpr.Reader):
         def product(self, left: np.ndarray, right: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from shiplog.exceptions import ShiplogError
+from shiplog.export import given_simulator
 from shiplog.export.job import Job
 from shiplog.export.not_loaded import NotLoaded
 from shiplog.export.targets import NUMBERS, PREDICTIONS, Target
@@ -101,6 +102,9 @@ def record(
 def export(job: Job, to: str, target: Target, path: Path) -> Exported:
     """Raises ShiplogError for what the target cannot express, and where it cannot be written."""
     maker = target.maker
+    given_simulator.refuse_unwritable(
+        job.run, to, target.kind == PREDICTIONS or (target.of_voyages and bool(job.voyages))
+    )
     losses = maker.losses(job)
     known, unloaded = None, ""
     with files.temporary_folder() as folder:

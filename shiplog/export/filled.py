@@ -10,10 +10,20 @@ WORD = re.compile(r"@([A-Z_0-9]+)@")
 _UNSAFE = re.compile(r"[^\w .,:;()+\-=/%']", re.ASCII)
 
 
-def filled(template: str, words: Mapping[str, str]) -> str:
-    """The text of a file of `templates`. Raises KeyError for a word that is not given."""
+def filled(template: str, words: Mapping[str, str], given: bool = False) -> str:
+    """The text of a file of `templates`, `around_given`. Raises KeyError for a word that is not
+    given."""
     text = resources.files("shiplog.export").joinpath("templates", template).read_text("utf-8")
-    return replaced(text, words)
+    return replaced(around_given(text, given), words)
+
+
+_GIVEN = re.compile(r"^#ifdef GIVEN\n(.*?)^#endif\n", re.MULTILINE | re.DOTALL)
+
+
+def around_given(text: str, given: bool) -> str:
+    """C with the lines between `#ifdef GIVEN` and `#endif`, which are of an FMU with another one
+    in it, or without them: nothing that a ship does not need stands in its source."""
+    return _GIVEN.sub(r"\1" if given else "", text)
 
 
 def replaced(text: str, words: Mapping[str, str]) -> str:

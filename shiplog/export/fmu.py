@@ -22,10 +22,19 @@ from typing import Any
 import numpy as np
 
 from shiplog.exceptions import ShiplogError, listed
-from shiplog.export import c_source, compilers, fmu_description, fmu_variables
+from shiplog.export import (
+    c_source,
+    compilers,
+    fmpy_sailing,
+    fmu_description,
+    fmu_variables,
+    given_simulator,
+    given_trial,
+    given_unit,
+)
 from shiplog.export.filled import filled, inert
+from shiplog.export.fmpy_sailing import Names
 from shiplog.export.job import Job
-from shiplog.export.not_loaded import NotLoaded
 from shiplog.export.ship import Ship
 from shiplog.export.trial import Difference, Trial, difference
 from shiplog.machine import files
@@ -48,12 +57,22 @@ def losses(job: Job) -> tuple[str, ...]:
 
 def losses_of(job: Job, version: str) -> tuple[str, ...]:
     """With the systems that it has no library for, or one that nobody has run."""
-    there, lacking = [], []
+    there, lacking, nothing = [], [], []
+    unit = job.ship.unit
     for system in compilers.SYSTEMS:
         folder = system.fmi2 if version == "2" else system.fmi3
         if folder and folder not in here():
-            (lacking if compilers.for_system(system) is None else there).append(folder)
+            if unit is not None and unit.library(system) is None:
+                nothing.append(folder)
+            else:
+                (lacking if compilers.for_system(system) is None else there).append(folder)
     found = list(job.ship.losses)
+    if (around := given_simulator.asked(job.run)) is not None:
+        found.append(given_trial.on_its_own(around, job.trial))
+    if unit is not None and unit.facts["tool"]:
+        found.append(f"The program that {unit.source.name} needs at run time, as it says.")
+    if unit is not None and nothing:
+        found.append(f"Libraries for {listed(nothing)}: {unit.source.name} has none itself.")
     if there:
         found.append(f"Libraries for {listed(there)} are compiled, and were never run.")
     if lacking:
@@ -99,6 +118,8 @@ def _parts(ship: Ship, record: Sequence[str], version: str) -> dict[str, bytes]:
             for name in libraries
         },
     }  # fmt: skip
+    if (unit := ship.unit) is not None:
+        facts["given"] = {"name": unit.source.name, "sha256": unit.source.sha256}
     texts["resources/shiplog.json"] = json.dumps(facts, indent=2, ensure_ascii=False)
     texts["resources/OspModelDescription.xml"] = fmu_description.osp(ship, variables)
     texts["documentation/index.html"] = _page(ship, record, facts)
@@ -106,6 +127,8 @@ def _parts(ship: Ship, record: Sequence[str], version: str) -> dict[str, bytes]:
     for name, data in libraries.items():
         ending = next(s.ending for s in compilers.SYSTEMS if name in (s.fmi2, s.fmi3))
         found[f"binaries/{name}/{ship.identifier}{ending}"] = data
+    if ship.unit is not None:
+        found |= {f"{given_unit.FOLDER}/{n}": data for n, data in ship.unit.content.items()}
     return found
 
 
@@ -121,7 +144,9 @@ def sources(ship: Ship, version: str) -> dict[str, str]:
     words = {"NAME": ship.identifier, "SPEED": repr(ship.speed), "GUID": "\0"}
     found = {"ship.h": c_source.header(ship, [])}
     for name in ("component.h", f"fmi{version}.c"):
-        found[name] = filled(name, words).replace("\0", "@GUID@")
+        found[name] = filled(name, words, given=ship.unit is not None).replace("\0", "@GUID@")
+    if ship.unit is not None:
+        found["given.h"] = ship.unit.header(ship.identifier)
     return found
 
 
@@ -133,6 +158,8 @@ def binaries(ship: Ship, code: Mapping[str, str], version: str) -> dict[str, byt
         command = compilers.for_system(system)
         if command is None or not folder:
             continue
+        if ship.unit is not None and ship.unit.library(system) is None:
+            continue  # what it would ask is not there
         key = (folder, "".join(code.values()))
         if key not in _compiled:
             _compiled[key] = _library(ship, code, version, command, system)
@@ -148,7 +175,8 @@ def _library(
         for name, text in code.items():
             (folder / name).write_text(text, encoding="utf-8")
         out = folder / "binary" / f"{ship.identifier}{system.ending}"
-        compilers.shared(command, folder / f"fmi{version}.c", out, system)
+        opening = ["-ldl"] if ship.unit is not None and "linux" in system.fmi3 else []
+        compilers.shared(command, folder / f"fmi{version}.c", out, system, opening)
         library, place = out.read_bytes(), str(folder).encode()
     if place in library:  # a debugger's note; a library goes to others
         raise ShiplogError(
@@ -198,55 +226,10 @@ def _page(ship: Ship, record: Sequence[str], facts: Mapping[str, Any]) -> str:
 def sail(ship: Ship, trial: Trial, path: Path) -> np.ndarray:
     """[n, 6] by FMPy, a communication step an inner step. Raises NotLoaded without FMPy, or where
     no binary of this machine is in it."""
-    try:
-        import fmpy
-        from fmpy.fmi2 import FMU2Slave
-        from fmpy.fmi3 import FMU3Slave
-    except ImportError as error:
-        raise NotLoaded("FMPy is not installed (pip install 'shiplog[export]')") from error
-    description = fmpy.read_model_description(str(path), validate=True)
-    with files.temporary_folder() as folder:
-        fmpy.extract(str(path), str(folder))
-        binary = folder / "binaries"
-        if not any((binary / name).is_dir() for name in here()):
-            raise NotLoaded("no C compiler is on this machine, so it holds sources alone")
-        assert description.coSimulation is not None
-        make = FMU2Slave if str(description.fmiVersion).startswith("2") else FMU3Slave
-        fmu = make(
-            guid=description.guid, unzipDirectory=str(folder), instanceName="trial",
-            modelIdentifier=description.coSimulation.modelIdentifier,
-        )  # fmt: skip
-        return _sailed(fmu, description, ship, trial)
-
-
-def _sailed(fmu: Any, description: Any, ship: Ship, trial: Trial) -> np.ndarray:
-    """Of an FMPy slave of FMI 2 or 3, freed at the end."""
-    places = {v.name: v.valueReference for v in description.modelVariables}
-    three = str(description.fmiVersion).startswith("3")
-    put, get = (fmu.setFloat64, fmu.getFloat64) if three else (fmu.setReal, fmu.getReal)
-    fmu.instantiate()
-    try:
-        starts = [places[f"start.{n}"] for n in trial.names]
-        put(starts, trial.start.tolist())
-        water = [places[f"{w}.{a}"] for w in ("wind", "current") for a in ("x0", "y0")]
-        put(water, [*trial.water.wind, *trial.water.current])
-        if three:
-            fmu.enterInitializationMode(startTime=0.0)
-        else:
-            fmu.setupExperiment(startTime=0.0)
-            fmu.enterInitializationMode()
-        fmu.exitInitializationMode()
-        orders = [places[f"order.{i.name}"] for i in ship.inputs]
-        state = [places[n] for n in trial.names]
-        found = np.empty((len(trial.orders), len(state)))
-        for k, row in enumerate(trial.orders):
-            put(orders, row.tolist())
-            fmu.doStep(currentCommunicationPoint=k * ship.step, communicationStepSize=ship.step)
-            found[k] = get(state)
-        fmu.terminate()
-        return found
-    finally:
-        fmu.freeInstance()
+    names = Names(here(), trial.names, tuple(i.name for i in ship.inputs), ship.step)
+    sailed = fmpy_sailing.sail if ship.unit is None else fmpy_sailing.sail_apart
+    water = (*trial.water.wind, *trial.water.current)
+    return sailed(path, names, trial.start, water, trial.orders)
 
 
 def version() -> str:

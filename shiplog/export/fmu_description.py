@@ -30,7 +30,9 @@ def fmi2(ship: Ship, variables: Sequence[Variable], token: str, about: str) -> s
         "fmiVersion": "2.0", "modelName": plain(ship.run), "guid": token, "description": about,
         "generationTool": ship.author, "variableNamingConvention": "structured",
     })  # fmt: skip
-    kind = xml.SubElement(root, "CoSimulation", {"modelIdentifier": ship.identifier, **CAN_2})
+    kind = xml.SubElement(
+        root, "CoSimulation", {"modelIdentifier": ship.identifier, **CAN_2, **_asked(ship)}
+    )
     xml.SubElement(xml.SubElement(kind, "SourceFiles"), "File", {"name": "fmi2.c"})
     _units(root, variables, "BaseUnit")
     logging = xml.SubElement(root, "LogCategories")
@@ -64,7 +66,8 @@ def fmi3(ship: Ship, variables: Sequence[Variable], token: str, about: str) -> s
         "description": about, "generationTool": ship.author,
         "variableNamingConvention": "structured",
     })  # fmt: skip
-    xml.SubElement(root, "CoSimulation", {"modelIdentifier": ship.identifier, **CAN_3})
+    can = CAN_3 | _asked(ship)
+    xml.SubElement(root, "CoSimulation", {"modelIdentifier": ship.identifier, **can})
     _units(root, variables, "BaseUnit")
     logging = xml.SubElement(root, "LogCategories")
     for name in ("logStatusWarning", "logStatusError"):
@@ -146,6 +149,17 @@ def _causality(one: Variable) -> dict[str, str]:
     if one.role == TIME:
         return {"causality": "independent", "variability": "continuous"}
     return {"causality": "parameter", "variability": "fixed" if one.role == FIXED else "tunable"}
+
+
+def _asked(ship: Ship) -> dict[str, str]:
+    """What an FMU that is inside asks of its importer: one instance in a process, or its tool."""
+    if ship.unit is None:
+        return {}
+    asked = {
+        "canBeInstantiatedOnlyOncePerProcess": ship.unit.facts["once"],
+        "needsExecutionTool": ship.unit.facts["tool"],
+    }
+    return {name: "true" for name, needed in asked.items() if needed}
 
 
 def _unit(unit: str) -> dict[str, str]:

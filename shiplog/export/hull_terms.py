@@ -67,7 +67,8 @@ def fit(job: Job, terms: Sequence[str], coriolis: bool = False) -> Fitted:
     radius = YAW_RADIUS * g.length
     inertia = min(g.mass * radius**2, yaw)
     added = m_x, m_y, yaw - inertia
-    return Fitted(values, tuple(explained), g.mass, g.x_g, added, inertia)  # type: ignore[arg-type]
+    x, y, n = explained
+    return Fitted(values, (x, y, n), g.mass, g.x_g, added, inertia)
 
 
 def _solved(names: Sequence[str], phi: np.ndarray, force: np.ndarray) -> np.ndarray:

@@ -108,7 +108,7 @@ def compare(job: Job, path: Path) -> Difference:
         if len(read) != len(own.columns[field]):
             return Difference({"messages": float(len(own.columns[field]) - len(read))}, 0.0)
         apart[c.name] = float(np.abs(read - own.columns[field]).max(initial=0.0))
-    return Difference(apart, float(predictions.frame(job)["elapsed"].max() or 0.0))  # type: ignore[arg-type]
+    return Difference(apart, predictions.seconds(job))
 
 
 def version() -> str:

@@ -10,6 +10,7 @@ import polars as pl
 from shiplog.exceptions import ModelError
 from shiplog.export.job import Job
 from shiplog.export.trial import Difference
+from shiplog.training.runs.load_model import ForeignRun
 
 COLUMNS = ("name", "value", "unit", "low", "high", "symbol", "meaning", "cause", "free")
 
@@ -27,6 +28,8 @@ def frame(job: Job) -> pl.DataFrame:
 
 
 def losses(job: Job) -> tuple[str, ...]:
+    if isinstance(job.run, ForeignRun):
+        return (f"{job.run.config.foreign.name} itself: the numbers of its causes are in it.",)
     weights = any(n.startswith("network.") for n in _names(job))
     held = job.run.extension
     found = ["The equations: they are in the documentation, and in --to python, cpp and fmu."]

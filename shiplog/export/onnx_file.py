@@ -152,6 +152,7 @@ def compare(job: Job, path: Path) -> Difference:
 
     trial = job.trial
     twin = copy.copy(job.sailor)
+    # a copy that asks the file, and no other model, for its accelerations
     twin.rates = lambda count, rng=None: rates  # type: ignore[method-assign]
     sailed, _ = twin.sail(trial.schedule, members=1, water=trial.water, seconds=SECONDS)
     return difference_of_rows(trial, sailed.state[0])

@@ -95,4 +95,9 @@ def apart(job: Job, read: pl.DataFrame) -> Difference:
         both = np.isfinite(one)
         gap = np.abs(one[both] - other[both])
         found[c.name] = float(np.max(gap, initial=0.0))
-    return Difference(found, float(own["elapsed"].max() or 0.0))  # type: ignore[arg-type]
+    return Difference(found, seconds(job))
+
+
+def seconds(job: Job) -> float:
+    """How far into its voyage the last prediction is."""
+    return float(frame(job)["elapsed"].to_numpy().max(initial=0.0))

@@ -5,10 +5,11 @@ from __future__ import annotations
 import base64
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from shiplog.export import statements, written_python
+from shiplog.export import asked_function, statements, written_python
 from shiplog.export.filled import filled, inert
 from shiplog.export.job import Job
 from shiplog.export.languages import PYTHON
@@ -28,13 +29,24 @@ def losses(job: Job) -> tuple[str, ...]:
 
 
 def compare(job: Job, path: Path) -> Difference:
-    return difference(job.trial, sail(job.ship, job.trial, path))
+    given = () if job.ship.function is None else (asked_function.of_job(job),)
+    return difference(job.trial, sail(job.ship, job.trial, path, given))
 
 
 def text(ship: Ship, record: Sequence[str]) -> str:
     made = statements.written(ship.equations, PYTHON, _product)
-    inputs = ship.inputs
+    inputs, given = ship.inputs, ship.function
     return filled("ship_py.txt", {
+        "GIVEN_FIRST": "f, " if given else "", "GIVEN_SELF": "f, " if given else "",
+        "GIVEN_ARRAY": ", array=np.asarray" if given else "",
+        "GIVEN_PARAMETER": ", given" if given else "",
+        "GIVEN_ARGUMENT": ", self._given" if given else "",
+        "GIVEN_ADDED": f" + asked(given, x, {', '.join(made.outputs[3:])})" if given else "",
+        "GIVEN_NAME": inert(f"{given.function} of {given.name}") if given else "",
+        "SHA256": given.sha256 if given else "",
+        "GIVEN_FACTS": ", ".join(
+            map(repr, (given.returns, given.step, given.layout, given.wind))
+        ) if given else "",
         "SHIP": inert(ship.ship), "RUN": inert(ship.run), "LABEL": inert(ship.label),
         "AUTHOR": ship.author, "RECORD": "\n".join(inert(line) for line in record),
         "METHOD": "Heun's method" if ship.heun else "Euler's method",
@@ -55,13 +67,13 @@ def text(ship: Ship, record: Sequence[str]) -> str:
         "CONSTANTS": str(made.constants), "HOISTED": _indented(made.hoisted),
         "VARYING": _indented(made.varying) or "    pass",
         "SURGE": made.outputs[0], "SWAY": made.outputs[1], "YAW": made.outputs[2],
-    })  # fmt: skip
+    }, given=given is not None)  # fmt: skip
 
 
-def sail(ship: Ship, trial: Trial, path: Path) -> np.ndarray:
-    """[n, 6] by the file itself, which shiplog has just written."""
+def sail(ship: Ship, trial: Trial, path: Path, given: tuple[Any, ...] = ()) -> np.ndarray:
+    """[n, 6] by the file itself, which shiplog has just written, with the function that it asks."""
     known = written_python.names_of(path, ship.identifier)
-    made = known["Ship"](*trial.start)
+    made = known["Ship"](*given, *trial.start)
     found = np.empty((len(trial.orders), 6))
     for k, orders in enumerate(trial.orders):
         driven = dict(zip(known["ACTUATORS"], orders, strict=True))

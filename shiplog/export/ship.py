@@ -9,10 +9,13 @@ from importlib.metadata import version
 
 import numpy as np
 
-from shiplog.export import equations
+from shiplog.export import equations, given_simulator, given_unit
 from shiplog.export.equations import Equations
+from shiplog.export.given_simulator import Function
+from shiplog.export.given_unit import Unit
 from shiplog.simulation.controls import FASTEST, STEERING_CAUSES
-from shiplog.training.runs.load_model import Run
+from shiplog.training.runs import foreign_run
+from shiplog.training.runs.load_model import ForeignRun, Run
 from shiplog.training.runs.sailing_run import Sailor
 
 UNITS = {"rudder": "rad", "azimuth": "rad", "propeller": "rev/s", "thruster": "1"}
@@ -60,6 +63,8 @@ class Ship:
     lag, delay   s, of the steering
     limits       [3] |u|, |v|, |r| beyond which the model has diverged
     losses       what of the run is not in it, a sentence each
+    unit         a user's own FMU that is asked, around which the equations are
+    function     the same of a Python function
     """
 
     run: str
@@ -76,6 +81,8 @@ class Ship:
     lag: float = 0.0
     delay: float = 0.0
     losses: tuple[str, ...] = ()
+    unit: Unit | None = None
+    function: Function | None = None
 
     @property
     def identifier(self) -> str:
@@ -103,7 +110,18 @@ def of_run(run: Run, sailor: Sailor) -> Ship:
     plain = run.extension is None and run.judges_itself
     own = run.simulator(seed) if plain else run.extended(seed)
     actuators = run.profile.actuators
-    made = equations.of_model(own.model, len(own.theta), len(actuators), share=not plain)
+    around = given_simulator.asked(run)
+    unit = function = None
+    if around is None:
+        made = equations.of_model(own.model, len(own.theta), len(actuators), share=not plain)
+    else:
+        own = run.extended(seed)
+        rest, water = given_simulator.parts(around)
+        made = equations.of_model(rest, len(own.theta), len(actuators), share=True, water=water)
+        if around.config.foreign.kind == "fmu":
+            unit = given_unit.of_run(around)
+        else:
+            function = given_simulator.function_of(around)
     controls = sailor.controls(sailor.speed)
     found = Ship(
         run=run.name,
@@ -123,8 +141,10 @@ def of_run(run: Run, sailor: Sailor) -> Ship:
         step=sailor.row / sailor.substeps,
         heun=sailor.heun,
         speed=sailor.speed,
-        limits=tuple(float(x) for x in sailor.limits),  # type: ignore[arg-type]
+        limits=(float(sailor.limits[0]), float(sailor.limits[1]), float(sailor.limits[2])),
         losses=_losses(run, sailor),
+        unit=unit,
+        function=function,
     )  # fmt: skip
     return found if run.extension is None else _steered(found, run)
 
@@ -134,9 +154,11 @@ def _numbers(run: Run, names: tuple[str, ...], theta: np.ndarray) -> tuple[Numbe
     found = []
     for name, value in zip(names, theta.tolist(), strict=True):
         one = known.get(name)
-        if one is None:  # a cause's number, or a weight of a hybrid's network
+        if one is None:  # a cause's number, a weight of a hybrid's network, or a stand-in's
             of, _, place = name.rpartition(".")
             what = f"number {place} of {of}, SI" if place.isdigit() else "a weight of the network"
+            if not name.startswith("network.") and not place.isdigit():
+                what = f"of the MMG that stands in for {run.config.foreign.name}"
             found.append(Number(name, value, "", what))
         else:
             words = ", ".join(filter(None, (one.symbol, one.meaning)))
@@ -166,7 +188,14 @@ def _steered(ship: Ship, run: Run) -> Ship:
 
 
 def _losses(run: Run, sailor: Sailor) -> tuple[str, ...]:
-    found = []
+    around = given_simulator.asked(run)
+    found = [] if around is None else list(given_simulator.losses(around))
+    if isinstance(run, ForeignRun) and run.logged:
+        left = float(np.median(foreign_run.kept(run).misfit))
+        found.append(
+            f"{run.config.foreign.name} itself, which was logged: an MMG that was fitted to its "
+            f"accelerations stands in, and leaves {left:.0%} of them."
+        )
     if sailor.ignored:
         found.append(
             f"Causes of its record, which do not change how it sails: {', '.join(sailor.ignored)}."

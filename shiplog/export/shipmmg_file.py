@@ -86,7 +86,8 @@ def parameters(job: Job) -> Parameters:
         names = X_NAMES if letter == "X" else tuple(letter + n for n in Y_NAMES)
         c[0] = -c[0] if letter == "X" else c[0]  # a resistance
         manoeuvring |= dict(zip(names, c.tolist(), strict=True))
-    return Parameters(basic, manoeuvring, g.density, tuple(explained))  # type: ignore[arg-type]
+    x, y, n = explained
+    return Parameters(basic, manoeuvring, g.density, (x, y, n))
 
 
 def _refuse_other(job: Job, model: MMG) -> None:

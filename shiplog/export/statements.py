@@ -24,14 +24,14 @@ STATE_NAMES = {1: "u", 3: "v", 4: "psi", 5: "r"}  # of the state as the field ha
 @dataclass(frozen=True)
 class Statements:
     """hoisted    lines that fill the array `c` of the array `p` of coefficients
-    varying    lines that give the three numbers `outputs` of `c` and `x`
-    outputs    expressions of u̇, v̇ and ṙ
+    varying    lines that give the numbers `outputs` of `c` and `x`
+    outputs    expressions of u̇, v̇ and ṙ, and of what the equations have behind them
     constants  length of `c`
     """
 
     hoisted: tuple[str, ...]
     varying: tuple[str, ...]
-    outputs: tuple[str, str, str]
+    outputs: tuple[str, ...]
     constants: int
 
 
@@ -53,8 +53,8 @@ def written(equations: Equations, language: Language, product: Product) -> State
     for node in needed:
         if g.varies[node]:
             second.compute(node)
-    u, v, r = (second.number(node) for node in equations.outputs)
-    return Statements((*first.lines, *lines), tuple(second.lines), (u, v, r), len(places))
+    outputs = tuple(second.number(node) for node in equations.outputs)
+    return Statements((*first.lines, *lines), tuple(second.lines), outputs, len(places))
 
 
 def _hoisted(g: Graph, needed: list[int], outputs: tuple[int, ...]) -> list[int]:

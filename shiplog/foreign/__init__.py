@@ -11,7 +11,7 @@ without network, and only where its path was given by hand in this call. Here it
 | `mapping` | the TOML that says which of its variables is which channel |
 | `confinement`, `worker` | in the child: limits, and the answers to requests |
 | `callables` | in the child: a Python function |
-| `fmu`, `exchange` | in the child: an FMU by FMPy, for co-simulation or model exchange |
+| `fmu_file`, `fmu`, `exchange` | in the child: what an FMU says of itself, and its two kinds |
 | `bridge` | here: the child's other end |
 | `model` | here: what the rest of shiplog asks of it, as of any model without coefficients |
 

@@ -12,6 +12,7 @@ A window is integrated here, by Heun's rule (`integrate`), with all of its state
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 from collections.abc import Mapping
 from pathlib import Path
@@ -93,6 +94,19 @@ class ExchangeFmu(Fmu):
             except Stopped:
                 return None
         return found * self.velocity_factors[:, None]
+
+    def _turns(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """ψ̇ of its states, and r."""
+        if "heading" not in self.given:
+            return np.zeros(0), np.zeros(0)
+        at = self.given.index("heading")
+        z, w, found = self._states_of(rows), self._values(rows), []
+        for i in range(len(rows)):
+            with contextlib.suppress(Stopped):
+                turned = self._derivatives(z[i], w[i])[self.places[at]] * self.output_factors[at]
+                found.append((turned, rows[i, VELOCITIES[2]]))
+        turned, yawed = np.array(found).reshape(-1, 2).T
+        return turned, yawed
 
     def roll(
         self, start: np.ndarray, driven: np.ndarray, dt: np.ndarray, begin: np.ndarray

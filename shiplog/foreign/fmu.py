@@ -23,14 +23,19 @@ from typing import Any
 import numpy as np
 
 from shiplog.foreign.callables import MOST_TROUBLES, Refused
+from shiplog.foreign.fmu_file import first_line, library
 from shiplog.foreign.progress import NOW
 from shiplog.foreign.rows import HEADING, STATES, VELOCITIES, Trouble, apparent
 from shiplog.foreign.trying import checked
+from shiplog.nomenclature.frames import wrap
 
 SHORT = 0.02  # s, of an acceleration's steps; an FMU of a fixed inner step takes that one
 STATUS = {1: "warning", 2: "discard", 3: "error", 4: "fatal", 5: "pending"}
 CHANNELS = ("x0", "surge", "y0", "sway", "heading", "yaw_rate")
 STILL = 1e-9  # m/s²: what rounding leaves of an acceleration that is zero
+TURNS = 9  # rows at which its heading is compared with its yaw rate
+TURNED = 0.2  # of the turn by which they may differ: steps of 0.1 s leave a hundredth
+LEAST_TURN = 1e-3  # rad in a second, which is no turn: rounding, a filter, a display
 CLOCK = 0.5  # of a step, by which an FMU's own time may differ
 
 
@@ -38,55 +43,17 @@ class Stopped(Exception):
     """The FMU did not go on, in words."""
 
 
-def description(path: Path) -> dict[str, Any]:
-    """What the model description says. Raises Refused."""
-    fmpy = _library()
-    try:
-        found = fmpy.read_model_description(str(path), validate=False)
-    except Exception as error:
-        raise Refused(f"its model description cannot be read: {_first(error)}") from error
-    exchange = found.modelExchange is not None and found.fmiVersion.startswith("2.")
-    if found.coSimulation is None and not exchange:
-        raise Refused(
-            "it is neither for co-simulation (FMI 2.0 or 3.0) nor for model exchange (FMI 2.0)"
-        )
-    if not found.fmiVersion.startswith(("2.", "3.")):
-        raise Refused(f"it is of FMI {found.fmiVersion}; export it as FMI 2.0 or 3.0")
-    variables = []
-    for one in found.modelVariables:
-        kind = {"Real": "real", "Float64": "real", "Boolean": "boolean", "Integer": "integer",
-                "Int32": "integer"}.get(str(one.type))  # fmt: skip
-        if kind is None or one.dimensions:
-            continue
-        declared = getattr(one, "declaredType", None)
-        unit = one.unit or (getattr(declared, "unit", None) if declared is not None else None)
-        variables.append({
-            "name": one.name, "causality": one.causality or "local", "kind": kind,
-            "settable": one.start is not None and one.variability != "constant"
-            and one.causality not in ("calculatedParameter", "independent"),
-            "unit": unit or "", "description": one.description or "",
-        })  # fmt: skip
-    fixed = getattr(found.coSimulation, "fixedInternalStepSize", None)
-    experiment = found.defaultExperiment
-    step = fixed or (experiment.stepSize if experiment is not None else None) or 0.0
-    return {
-        "name": path.name, "version": found.fmiVersion, "tool": found.generationTool or "",
-        "step": min(float(step), 1.0), "variables": variables,
-        "exchange": found.coSimulation is None,
-    }  # fmt: skip
-
-
 class Fmu:
     """One instance, which is reset again and again."""
 
     def __init__(self, path: Path, mapping: Mapping[str, Any]) -> None:
-        fmpy = _library()
+        fmpy = library()
         self.folder = tempfile.mkdtemp(prefix="shiplog-fmu-")
         try:
             self.model_description = fmpy.read_model_description(str(path), validate=False)
             fmpy.extract(str(path), unzipdir=self.folder)
         except Exception as error:
-            raise Refused(f"it cannot be opened: {_first(error)}") from error
+            raise Refused(f"it cannot be opened: {first_line(error)}") from error
         self.step, self.hold = float(mapping["step"]), bool(mapping["hold"])
         inner = getattr(self.model_description.coSimulation, "fixedInternalStepSize", None)
         self.short = float(inner) if inner else min(SHORT, self.step)
@@ -142,6 +109,7 @@ class Fmu:
                 "its velocities do not change with state or inputs: it is no ship, or the mapping "
                 "is of other variables"
             )
+        self._refuse_other_yaw_rate(rows)
         return {
             "returns": "next state", "step": self.step, "layout": "row by row",
             "library": f"FMI {self.model_description.fmiVersion}", "changes": False,
@@ -151,6 +119,34 @@ class Fmu:
     def _moved(self, rows: np.ndarray) -> bool:
         found, _ = self.rates(rows[: min(len(rows), 12)])
         return bool(np.nanmax(np.nanstd(found, axis=0), initial=0.0) > STILL)
+
+    def _refuse_other_yaw_rate(self, rows: np.ndarray) -> None:
+        """Raises Refused where the median of some rows has a heading that does not turn with the
+        yaw rate."""
+        turned, yawed = self._turns(rows[:TURNS])
+        apart = np.abs(turned - yawed)
+        if len(apart) and np.median(apart) > TURNED * np.median(np.abs(yawed)) + LEAST_TURN:
+            k = int(np.argsort(apart)[len(apart) // 2])
+            raise Refused(
+                f"its heading does not turn with its yaw rate (by {math.degrees(turned[k]):.2g} "
+                f"deg in a second, of which the yaw rate makes {math.degrees(yawed[k]):.2g} deg): "
+                "it is no ship, or the mapping has another unit or sign"
+            )
+
+    def _turns(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Δψ and ∫ r dt [n] of its own outputs, over a second from each row, rad."""
+        found, h = [], self.step
+        for row in rows:
+            with contextlib.suppress(Stopped):
+                self._begin_at(row)
+                states = [self._states(row)]
+                for k in range(max(1, math.ceil(1.0 / h - 1e-9))):
+                    self._advance(k * h, h)
+                    states.append(self._states(row))
+                heading, r = np.array(states)[:, [HEADING, VELOCITIES[2]]].T
+                found.append((np.sum(wrap(np.diff(heading))), 0.5 * h * np.sum(r[1:] + r[:-1])))
+        turned, yawed = np.array(found).reshape(-1, 2).T
+        return turned, yawed
 
     def exact(self, rows: np.ndarray) -> None:
         return None
@@ -297,7 +293,7 @@ class Fmu:
                 )  # fmt: skip
             self.instance.instantiate()
         except Exception as error:
-            raise Stopped(f"cannot be made an instance of: {_first(error)}") from error
+            raise Stopped(f"cannot be made an instance of: {first_line(error)}") from error
         self.used = False
 
     def _kind(self) -> Any:
@@ -392,16 +388,3 @@ class _References:
 
 def _row(state: np.ndarray, driven: np.ndarray, time: float) -> np.ndarray:
     return np.concatenate((state, driven, (time,)))
-
-
-def _library() -> Any:
-    try:
-        import fmpy
-    except ImportError as error:
-        raise Refused("FMPy runs FMUs, and is not installed; pip install 'shiplog[fmu]'") from error
-    return fmpy
-
-
-def _first(error: BaseException) -> str:
-    lines = str(error).strip().splitlines()
-    return lines[0][:200] if lines else type(error).__name__

@@ -63,7 +63,7 @@ def serve(pipe: Connection) -> None:
             return
         try:
             if head["do"] == "describe":
-                from shiplog.foreign.fmu import description
+                from shiplog.foreign.fmu_file import description
 
                 send(pipe, {"facts": description(Path(head["path"]))})
                 continue

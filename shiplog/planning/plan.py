@@ -20,7 +20,7 @@ from shiplog.simulation.schedules import Zigzag
 from shiplog.simulation.sensitivities import losses
 from shiplog.simulation.window_series import WindowSeries, series
 from shiplog.training.physics.output_error import residual_variance
-from shiplog.training.runs.load_model import PhysicalRun, Run
+from shiplog.training.runs.load_model import ForeignRun, PhysicalRun, Run
 from shiplog.training.runs.sailing_run import Outside, Sailor
 from shiplog.training.runs.trust_file import SHEET
 from shiplog.voyages.windows import windows
@@ -89,6 +89,14 @@ class Plan:
 
 def refuse_unplannable(run: Run) -> PhysicalRun:
     """Raises CannotPlan, saying what is possible with the run instead."""
+    if isinstance(run, ForeignRun):
+        raise CannotPlan(
+            f"{run.name} is a run of {run.config.foreign.name}, which has no coefficients of "
+            "shiplog's: no manoeuvre makes an interval of them narrower.",
+            hint="--causes-only, with --simulator where it is a file, tells which causes the "
+            "standard manoeuvres tell apart; or identify the ship from the same voyages with "
+            "`shiplog train --model mmg`, and plan that run.",
+        )
     if not isinstance(run, PhysicalRun):
         raise CannotPlan(
             f"{run.name} is a network: it has no coefficients of which a manoeuvre could make an "

@@ -108,10 +108,10 @@ def slopes(
     by_theta = by_water @ _water_by(model, theta)
     if not model.causes:
         return middle, by_state, by_driven, by_theta
-    extra = rollouts.row_slopes(_rest(model), theta, np.concatenate((state, driven), 1))
+    extra = rollouts.row_slopes(rest_of(model), theta, np.concatenate((state, driven), 1))
     if extra is None:
-        extra = _by_jax(_rest(model), theta, state, driven)
-    return tuple(  # type: ignore[return-value]
+        extra = _by_jax(rest_of(model), theta, state, driven)
+    return tuple(  # type: ignore[return-value]  # four, as `extra` has
         one + other
         for one, other in zip((middle, by_state, by_driven, by_theta), extra, strict=True)
     )
@@ -205,7 +205,8 @@ class ForeignSimulator:
 # Parts
 
 
-def _rest(model: Extended) -> Extended:
+def rest_of(model: Extended) -> Extended:
+    """What causes add to a simulator's accelerations, in water that moves: c."""
     return replace(model, base=Nothing())
 
 
@@ -229,7 +230,7 @@ def _added(
     if not _pushed(model, theta):
         (ahead, starboard), r = water, inputs[:, 5]
         return np.stack((r * starboard, -r * ahead, np.zeros_like(r)), -1)
-    rest = _rest(model)
+    rest = rest_of(model)
     if theta.ndim == 2:
         rest = EachItsOwn(rest, theta.shape[1])
         inputs = np.concatenate((inputs[:, :-2], theta, inputs[:, -2:]), 1)

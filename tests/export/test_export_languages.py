@@ -90,6 +90,35 @@ def test_numpy_says_what_jax_says(cases):
     same(np.stack(found, 1), wanted)
 
 
+class Turned:
+    """Sines and cosines of sums with an angle of two components."""
+
+    def acceleration(self, theta, state, actuator, wind):
+        x, y, a = state[1], state[3], state[4]
+        t = jnp.arctan2(y, x)
+        sums = (jnp.sin(a + t) + 2.0 * jnp.cos(t + a), jnp.sin(a - t) + 3.0 * jnp.cos(t - a))
+        return jnp.stack((*sums, jnp.sin(t) - 5.0 * jnp.cos(a - t)))
+
+
+def test_an_angle_of_two_components_needs_no_angle():
+    """Against JAX, which has it: also where there is no direction."""
+    made = statements.written(of_model(Turned(), 0, 0, share=False), PYTHON, lambda *_: [])
+    code = "\n".join((*made.hoisted, *made.varying))
+    assert "arctan2" not in code + "".join(made.outputs)
+    values = [0.0, -0.0, 1e-160, 0.5, -0.5, -1.0, 3.7, -40.0, 1e120]
+    x = np.array([(a, b, c) for a in values for b in values for c in (0.0, 0.3, -2.0, 9.0)])
+    x = x[~((np.abs(x[:, :2]).max(1) < 1e-140) & (np.abs(x[:, :2]).max(1) > 0.0))]
+    x = x[~(np.signbit(x[:, 0]) & (x[:, :2] == 0.0).all(1))]  # atan2(0, -0) is a half turn
+    whole = np.zeros((8, len(x)))
+    whole[[1, 3, 4]] = x.T
+    known = {n: getattr(np, n) for n in dir(np)} | {"c": [], "x": whole}
+    exec(code, known)
+    found = np.stack([np.broadcast_to(eval(one, known), len(x)) for one in made.outputs], 1)
+    with double():
+        wanted = [Turned().acceleration(None, jnp.array(one), None, None) for one in whole.T]
+    assert found == pytest.approx(np.array(wanted), abs=1e-12)
+
+
 @pytest.mark.long
 @pytest.mark.skipif(compilers.own() is None, reason="no C compiler is installed")
 def test_c_says_what_jax_says(cases, tmp_path):

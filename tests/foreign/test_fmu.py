@@ -10,7 +10,8 @@ pytest.importorskip("fmpy", reason="FMPy is not installed: pip install 'shiplog[
 from shiplog.foreign import mapping
 from shiplog.foreign.callables import Refused
 from shiplog.foreign.exchange import ExchangeFmu
-from shiplog.foreign.fmu import Fmu, description
+from shiplog.foreign.fmu import Fmu
+from shiplog.foreign.fmu_file import description
 from shiplog.foreign.mapping import Description
 from shiplog.foreign.rows import apparent
 from shiplog.foreign.source import SimulatorError
@@ -189,6 +190,19 @@ def test_an_fmu_that_is_no_ship_is_refused(tmp_path):
     file.write_text(text, "utf-8")
     with pytest.raises(Refused, match="it is no ship"):
         Fmu(path, mapping.load(file, told, SHIP, False)).probe(rows())
+
+
+@pytest.mark.parametrize("exchange", [False, True])
+def test_a_yaw_rate_in_another_unit_is_refused(tmp_path, exchange):
+    """The FMU's yaw rate is in rad/s; a mapping that says deg/s has a heading that turns faster."""
+    path = fmus.build(tmp_path / "tanker.fmu", exchange=exchange)
+    told = Description.from_record(description(path))
+    text = mapping.draft(told, SHIP).replace('unit = "rad/s"', 'unit = "deg/s"')
+    file = tmp_path / "tanker.toml"
+    file.write_text(text, "utf-8")
+    mapped = mapping.load(file, told, SHIP, False)
+    with pytest.raises(Refused, match="its heading does not turn with its yaw rate"):
+        (ExchangeFmu if exchange else Fmu)(path, mapped).probe(rows(9))
 
 
 def test_names_are_inert_in_a_draft():

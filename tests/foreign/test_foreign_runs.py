@@ -16,6 +16,7 @@ from shiplog.exceptions import RunError, UsageError
 from shiplog.foreign.source import SimulatorError
 from shiplog.logs.conversion.write import Series, write_log
 from shiplog.models.causes import CATALOGUE
+from shiplog.planning.plan import CannotPlan
 from shiplog.training.runs import foreign_run, load_model
 from shiplog.voyages.ingest.ingest import ingest
 from shiplog.voyages.store.store import Store
@@ -115,6 +116,19 @@ def test_what_was_logged_is_a_run(store, tmp_path):
                                    "propeller": [5.0, 5.0]}))  # fmt: skip
 
 
+def test_what_was_logged_has_no_model_to_write(store, tmp_path):
+    given = Given(f"logs:{TOPIC}", logs=(store.path.parent,))
+    trained(store, tmp_path / "run", given)
+    write = ["export", str(tmp_path / "run"), "--out", str(tmp_path / "x")]
+    refused = CliRunner().invoke(app, [*write, "--to", "cpp"])
+    assert "has no model to write" in str(refused.exception)
+    where = ["--to", "csv", "--store", str(store.path), "--voyages", "second"]
+    done = CliRunner().invoke(app, [*write, *where])
+    assert done.exit_code == 0, done.exception
+    rows = pl.read_csv(tmp_path / "x")
+    assert (rows["surge"] - rows["measured_surge"]).mean() == pytest.approx(0.05, abs=5e-3)
+
+
 def test_a_poor_stand_in_changes_no_ship(store, tmp_path):
     """It leaves 60 % of the accelerations: sensors, current and forces are tested all the same."""
     file = tmp_path / "given.py"
@@ -159,4 +173,7 @@ def test_the_command_line(store, tmp_path):
     sailed = invoke(app, ["simulate", str(run), "--zigzag", "10/10", "--members", "1",
                           "--simulator", str(file)])  # fmt: skip
     assert sailed.exit_code == 0, sailed.output
+    planned = invoke(app, ["plan", str(run), *where, "--simulator", str(file)])
+    assert isinstance(planned.exception, CannotPlan)
+    assert "--causes-only" in str(planned.exception.hint)
     foreign_run.close()

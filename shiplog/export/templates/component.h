@@ -43,8 +43,27 @@ typedef struct {
     int changed;
 } memory;
 
+/* All but what belongs to the instance. */
+static void memory_copy(memory *to, const memory *from) {
+#ifdef GIVEN
+    struct given *own = to->parameters.given;
+#endif
+    memcpy(to, from, sizeof *to);
+#ifdef GIVEN
+    to->parameters.given = own;
+#endif
+}
+
+/* A state that an importer keeps, in memory that is taken where there is none. 0 where none is left. */
+static int memory_kept(void **to, const void *from) {
+    if (*to == NULL) *to = malloc(sizeof(memory));
+    if (*to != NULL) memcpy(*to, from, sizeof(memory));
+    return *to != NULL;
+}
+
 static void memory_reset(memory *m) {
-    memset(m, 0, sizeof *m);
+    static const memory nothing;
+    memory_copy(m, &nothing);
     @NAME@_defaults(&m->parameters);
     memcpy(m->input.order, @NAME@_APPROACH, sizeof m->input.order);
     memcpy(m->start_actuator, @NAME@_APPROACH, sizeof m->start_actuator);
@@ -138,6 +157,12 @@ static int memory_step(memory *m, double at, double seconds, char *said) {
     m->time = end;
     for (i = 0; i < 6; ++i)
         if (!(fabs(m->state[i]) < HUGE_VAL)) {
+#ifdef GIVEN
+            if (m->parameters.given->said[0]) {
+                snprintf(said, 200, "before %.9g s %.150s", end, m->parameters.given->said);
+                return FAILED;
+            }
+#endif
             snprintf(said, 200, "the model has no finite state at %.9g s", end);
             return FAILED;
         }

@@ -86,10 +86,26 @@ EXPORT fmi2Component FMI2(fmi2Instantiate)(fmi2String name, fmi2Type type, fmi2S
         free(c);
         return NULL;
     }
+#ifdef GIVEN
+    {
+        char said[200];
+        c->now.parameters.given = given_open(resources, said);
+        if (c->now.parameters.given == NULL) {
+            say(c, fmi2Error, said);
+            free(c);
+            return NULL;
+        }
+    }
+#endif
     return c;
 }
 
-EXPORT void FMI2(fmi2FreeInstance)(fmi2Component c) { free(c); }
+EXPORT void FMI2(fmi2FreeInstance)(fmi2Component c) {
+#ifdef GIVEN
+    if (c) given_close(((component *)c)->now.parameters.given);
+#endif
+    free(c);
+}
 
 EXPORT fmi2Status FMI2(fmi2SetupExperiment)(fmi2Component c, fmi2Boolean toleranceDefined,
                                             fmi2Real tolerance, fmi2Real start,
@@ -179,14 +195,13 @@ NONE(fmi2GetString, fmi2String, )
 NONE(fmi2SetString, fmi2String, const)
 
 EXPORT fmi2Status FMI2(fmi2GetFMUstate)(fmi2Component c, fmi2FMUstate *state) {
-    if (*state == NULL) *state = malloc(sizeof(memory));
-    if (*state == NULL) return say((component *)c, fmi2Error, "no memory is left");
-    memcpy(*state, &((component *)c)->now, sizeof(memory));
+    if (!memory_kept(state, &((component *)c)->now))
+        return say((component *)c, fmi2Error, "no memory is left");
     return fmi2OK;
 }
 
 EXPORT fmi2Status FMI2(fmi2SetFMUstate)(fmi2Component c, fmi2FMUstate state) {
-    memcpy(&((component *)c)->now, state, sizeof(memory));
+    memory_copy(&((component *)c)->now, (const memory *)state);
     return fmi2OK;
 }
 
@@ -215,10 +230,7 @@ EXPORT fmi2Status FMI2(fmi2SerializeFMUstate)(fmi2Component c, fmi2FMUstate stat
 EXPORT fmi2Status FMI2(fmi2DeSerializeFMUstate)(fmi2Component c, const fmi2Byte bytes[],
                                                 size_t size, fmi2FMUstate *state) {
     if (size != sizeof(memory)) return say((component *)c, fmi2Error, "no state of this FMU");
-    if (*state == NULL) *state = malloc(sizeof(memory));
-    if (*state == NULL) return say((component *)c, fmi2Error, "no memory is left");
-    memcpy(*state, bytes, sizeof(memory));
-    return fmi2OK;
+    return memory_kept(state, bytes) ? fmi2OK : say((component *)c, fmi2Error, "no memory is left");
 }
 
 EXPORT fmi2Status FMI2(fmi2GetDirectionalDerivative)(

@@ -82,6 +82,17 @@ EXPORT fmi3Instance FMI3(fmi3InstantiateCoSimulation)(
         free(c);
         return NULL;
     }
+#ifdef GIVEN
+    {
+        char said[200];
+        c->now.parameters.given = given_open(resources, said);
+        if (c->now.parameters.given == NULL) {
+            say(c, fmi3Error, said);
+            free(c);
+            return NULL;
+        }
+    }
+#endif
     return c;
 }
 
@@ -116,7 +127,12 @@ EXPORT fmi3Instance FMI3(fmi3InstantiateScheduledExecution)(
     return NULL;
 }
 
-EXPORT void FMI3(fmi3FreeInstance)(fmi3Instance c) { free(c); }
+EXPORT void FMI3(fmi3FreeInstance)(fmi3Instance c) {
+#ifdef GIVEN
+    if (c) given_close(((component *)c)->now.parameters.given);
+#endif
+    free(c);
+}
 
 EXPORT fmi3Status FMI3(fmi3EnterInitializationMode)(fmi3Instance c, fmi3Boolean toleranceDefined,
                                                     fmi3Float64 tolerance, fmi3Float64 start,
@@ -201,14 +217,13 @@ EXPORT fmi3Status FMI3(fmi3SetBoolean)(fmi3Instance c, const fmi3ValueReference 
 }
 
 EXPORT fmi3Status FMI3(fmi3GetFMUState)(fmi3Instance c, fmi3FMUState *state) {
-    if (*state == NULL) *state = malloc(sizeof(memory));
-    if (*state == NULL) return say(c, fmi3Error, "no memory is left");
-    memcpy(*state, &((component *)c)->now, sizeof(memory));
+    if (!memory_kept(state, &((component *)c)->now))
+        return say(c, fmi3Error, "no memory is left");
     return fmi3OK;
 }
 
 EXPORT fmi3Status FMI3(fmi3SetFMUState)(fmi3Instance c, fmi3FMUState state) {
-    memcpy(&((component *)c)->now, state, sizeof(memory));
+    memory_copy(&((component *)c)->now, (const memory *)state);
     return fmi3OK;
 }
 
@@ -237,10 +252,7 @@ EXPORT fmi3Status FMI3(fmi3SerializeFMUState)(fmi3Instance c, fmi3FMUState state
 EXPORT fmi3Status FMI3(fmi3DeserializeFMUState)(fmi3Instance c, const fmi3Byte bytes[], size_t size,
                                                 fmi3FMUState *state) {
     if (size != sizeof(memory)) return say(c, fmi3Error, "no state of this FMU");
-    if (*state == NULL) *state = malloc(sizeof(memory));
-    if (*state == NULL) return say(c, fmi3Error, "no memory is left");
-    memcpy(*state, bytes, sizeof(memory));
-    return fmi3OK;
+    return memory_kept(state, bytes) ? fmi3OK : say(c, fmi3Error, "no memory is left");
 }
 
 EXPORT fmi3Status FMI3(fmi3EnterStepMode)(fmi3Instance c) {

@@ -17,6 +17,9 @@
 #define @NAME@_ACTUATORS @ACTUATORS@
 #define @NAME@_PAST @PAST@ /* steps that the steering's delay looks back; at least 1 */
 #define @NAME@_STEP @STEP@ /* s */
+#ifdef GIVEN
+#include "given.h"
+#endif
 
 /* What drives it, held over a step.
  * order    [actuators] ordered positions; they are followed at `rate` unless `recorded`
@@ -32,6 +35,9 @@ typedef struct {
     double coefficient[@NAME@_COEFFICIENTS + 1];
     double rate[@NAME@_ACTUATORS]; /* the fastest change a second */
     int recorded; /* orders are recorded positions: no rate limits them */
+#ifdef GIVEN
+    struct given *given; /* the simulator that is asked */
+#endif
 } @NAME@_parameters;
 
 /* state      x0, surge, y0, sway, heading, yaw rate, over ground, at the last step's end
@@ -76,11 +82,17 @@ static void @NAME@_prepare(const double *p, double *c) {
 /* Accelerations [3] of x: x0, surge, y0, sway, heading, yaw rate, the actuators, and the true wind
  * along x0 and y0, all relative to the water; turn: cosine and sine of the heading. */
 static void @NAME@_accelerations(const double *c, const double *x, const double *turn,
-                                 double *acceleration) {
+                                 double *acceleration@GIVEN_PARAMETER@) {
 @VARYING@
     acceleration[0] = @SURGE@;
     acceleration[1] = @SWAY@;
     acceleration[2] = @YAW@;
+#ifdef GIVEN
+    {
+        const double water[2] = {@WATER@};
+        given_accelerations(given, x, turn, water, acceleration);
+    }
+#endif
     (void)c;
     (void)turn;
 }
@@ -189,13 +201,13 @@ static void @NAME@_take(@NAME@_ship *ship, const @NAME@_parameters *p, const @NA
     @NAME@_act(ship, mean, x + 6);
     x[6 + @NAME@_ACTUATORS] = input->wind[0] + current[0];
     x[7 + @NAME@_ACTUATORS] = input->wind[1] + current[1];
-    @NAME@_accelerations(ship->constant, x, ship->turn, ship->acceleration);
+    @NAME@_accelerations(ship->constant, x, ship->turn, ship->acceleration@GIVEN_ARGUMENT@);
     if (@HEUN@) { /* of coefficients that were not fitted to Euler's steps */
         double ahead[6 + @NAME@_ACTUATORS + 2], turn[2], second[3];
         int i;
         memcpy(ahead, x, sizeof x);
         @NAME@_advance(x, ship->turn, ship->acceleration, current, @NAME@_STEP, ahead, turn);
-        @NAME@_accelerations(ship->constant, ahead, turn, second);
+        @NAME@_accelerations(ship->constant, ahead, turn, second@GIVEN_ARGUMENT@);
         for (i = 0; i < 3; ++i) ship->acceleration[i] = 0.5 * (ship->acceleration[i] + second[i]);
     }
     ship->begun = ship->sailed = 1;

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import atexit
 import json
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -20,19 +21,25 @@ import polars as pl
 from shiplog.exceptions import RunError
 from shiplog.foreign.bridge import Bridge, Ship
 from shiplog.foreign.model import Foreign
-from shiplog.foreign.source import Source
+from shiplog.foreign.source import SimulatorError, Source
 from shiplog.machine import files
 from shiplog.nomenclature.channels import STATE, VELOCITY_IN_STATE, WIND
+from shiplog.nomenclature.numbers import counted
 from shiplog.ship_profile.profile import Profile
 from shiplog.simulation.foreign_model import Failure
+from shiplog.simulation.scoring import window_loss
 from shiplog.simulation.window_series import true_wind
 from shiplog.training.runs.run_folder import RunFolder
 from shiplog.training.settings import run_files
 from shiplog.training.settings.run_config import Foreign as Settings
+from shiplog.voyages.windows.windows import Windows
 
 FILE, STATES_FILE = "stand_in.safetensors", "states.parquet"
 PROBE_ROWS = 41  # at which a simulator is tried: no other number of rows is as many as its columns
 RANDOM = 0  # seed of their choice
+# Errors of velocity over the ship's own velocities, √(L / L of standing still), from which on it is
+# no model of the ship: a wrong sign leaves 2, knots for m/s 1
+NO_SHIP = 5.0
 
 _bridges: dict[tuple, Bridge] = {}
 _failures: dict[tuple, dict[Failure, None]] = {}
@@ -108,6 +115,24 @@ def save(folder: RunFolder, found: Kept, states: pl.DataFrame | None = None) -> 
     run_files.save_arrays(seed / FILE, found._asdict())
     if states is not None:
         files.write_frame(seed / STATES_FILE, states)
+
+
+def refuse_no_ship(folder: RunFolder, losses: np.ndarray, cut: Windows) -> None:
+    """Raises SimulatorError for a simulator whose errors are far beyond the ship's own motion; `L`
+    of windows [N]. Windows in which it failed are not asked."""
+    sound = np.isfinite(losses)
+    still = window_loss(cut.state, cut.dt)
+    if not sound.any():
+        return
+    ratio = math.sqrt(np.median(losses[sound]) / max(np.median(still[sound]), 1e-300))
+    if ratio > NO_SHIP:
+        name, ship = folder.config.foreign.name, folder.profile.ship.name
+        raise SimulatorError(
+            f"{name} does not move as {ship}: its velocities are wrong by {ratio:.2g} times what "
+            f"they are, the median of {counted(int(sound.sum()), 'window')}.",
+            hint="is it this ship's simulator? Look at the channels, units and signs of its "
+            "mapping, or at what the function returns.",
+        )
 
 
 def states(folder: RunFolder) -> pl.DataFrame:
