@@ -19,6 +19,7 @@ from shiplog.voyages.ingest.ingest import ingest
 from shiplog.voyages.store.store import Store
 
 pytest.importorskip("fmpy", reason="FMPy is not installed: pip install 'shiplog[fmu]'")
+pytestmark = pytest.mark.long  # with a package that CI installs for them alone
 
 LOG = Path(__file__).parents[2] / "sample_logs" / "voyage_1.mcap"
 SPRINGS = {"rudder_port": ("k1", "rad"), "rudder_starboard": ("k2", "rad"),
