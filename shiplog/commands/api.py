@@ -524,7 +524,7 @@ def trend(
     Raises ShiplogError.
     """
     from shiplog.commands import trend as following
-    from shiplog.diagnosis.season.trends import parse_date
+    from shiplog.diagnosis.season.asked import parse_date
 
     (path,) = _runs(run)
     return following.trend_of(
