@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
 
 from shiplog.live import nominal, preparation
 
-
-class Known:
-    """Of a store, no more than where it is."""
-
-    path = "store"
+RUN: Any = "run"  # that nobody looks into
+STORE: Any = SimpleNamespace(path=Path("store"))
+PLACE = Path("runs/mmg")
 
 
 @pytest.fixture
@@ -37,8 +39,8 @@ def asked(monkeypatch):
 
 
 def test_the_first_watch_of_a_run_has_its_campaign_fitted_by_a_child(asked):
-    first = preparation.campaign_of("run", "runs/mmg", Known())
-    again = preparation.campaign_of("run", "runs/mmg", Known())
+    first = preparation.campaign_of(RUN, PLACE, STORE)
+    again = preparation.campaign_of(RUN, PLACE, STORE)
     assert first == again == ("small", "thresholds")
     assert asked == [
         "child of runs/mmg and store", "without segments", "given back", "without segments",
@@ -60,4 +62,4 @@ def test_a_child_that_ends_is_no_fault(monkeypatch):
             pass
 
     monkeypatch.setattr(preparation.child, "spawn", lambda serve, environment: (Gone(), Gone()))
-    preparation._in_child("runs/mmg", "store")
+    preparation._in_child(PLACE, STORE.path)

@@ -3,7 +3,7 @@
 
     python -m pipelines.experiments.watching.replayed RUN STORE LOGS OUT.jsonl --per-day 24
     python -m pipelines.experiments.watching.replayed RUN STORE LOGS OUT.jsonl --report \
-        [--verdict verdict.json] [--markdown PAGE]
+        [--verdict verdict.json] [--markdown docs/evidence/watched_voyages.md]
 
 One line a voyage is appended to OUT.jsonl; what is there is not done again. Every voyage is watched
 from its first message on, without what was learned from the one before. No truth is assumed.
@@ -32,10 +32,14 @@ from shiplog.training.runs import load_model
 from shiplog.voyages.samples import fields_read
 from shiplog.voyages.store.store import Store
 
-HEAD = (
-    "voyage", "trained on", "s", "segments", "most [nats]", "inside [%]", "at s", "watch", "ingest",
-    "diagnose",
-)  # fmt: skip
+TITLE = """# Recorded voyages, watched
+
+Voyages of the 3 m Esso Osaka (`frt-ds-esso`) replayed as if they were sailed now, each from its
+first message on. What the watch says stands next to what `ingest` says of the same log, and
+`diagnose` of all of them. No truth is assumed. A value that repeats for less than three seconds is
+reported by `ingest` alone, and so are clocks and scales, which need a whole log.
+Written by `python -m pipelines.experiments.watching.replayed RUN STORE LOGS OUT.jsonl --report`.
+"""
 
 
 def watch_all(given: argparse.Namespace) -> None:
@@ -89,7 +93,10 @@ def replayed(watch: Watch) -> dict[str, Any]:
 
 def ingested(store: Path, voyage: str) -> list[str]:
     """What `ingest` says of a voyage: rows that it left out, and other findings."""
-    facts = json.loads((store / f"voyage={voyage}" / "voyage.json").read_text(encoding="utf-8"))
+    path = store / f"voyage={voyage}" / "voyage.json"
+    if not path.exists():
+        return ["not in the store"]
+    facts = json.loads(path.read_text(encoding="utf-8"))
     report = facts["report"]
     found = [*report.get("left_out", []), *report.get("findings", [])]
     return [str(one.get("sentence") or one) if isinstance(one, dict) else str(one) for one in found]
@@ -107,33 +114,43 @@ def diagnosed(verdict: Any, voyage: str) -> list[str]:
 
 
 def report(given: argparse.Namespace) -> Iterator[str]:
+    """The page."""
     lines = done(given.out)
     verdict = None if given.verdict is None else json.loads(given.verdict.read_text("utf-8"))
     whole, cpu = sum(one["seconds"] for one in lines), sum(one["cpu_s"] for one in lines)
+    alarms = [w for one in lines for w in one["said"] if w["what"] == "alarm"]
+    yield TITLE
     yield (
-        f"{len(lines)} voyages, {whole / 3600.0:.2f} h, replayed in {cpu:.0f} s of processor time, "
-        f"{whole / max(cpu, 1e-9):.0f} times real time; the threshold is "
-        f"{lines[0]['threshold']:.1f} nats."
+        f"{len(lines)} voyages of {whole / 3600.0:.2f} h at {given.per_day:g} false alarms a day, "
+        f"of which {whole / 86_400.0 * given.per_day:.1f} are expected: {len(alarms)} alarms. The "
+        f"threshold is {lines[0]['threshold']:.1f} nats. They took {cpu:.0f} s of processor time, "
+        f"{whole / max(cpu, 1e-9):.0f} times real time; memory at the end "
+        f"{lines[-1]['resident_mb']:.0f} MB.\n"
     )
-    yield ""
-    yield f"| {' | '.join(HEAD)} |"
-    yield "| --- | --- | ---: | ---: | ---: | ---: | ---: | --- | --- | --- |"
+    yield "| voyage | trained on | s | segments | most [nats] | inside the band [%] | said |"
+    yield "| --- | --- | ---: | ---: | ---: | ---: | ---: |"
     for one in lines:
         most = "-" if one["most_nats"] is None else f"{one['most_nats']:.1f}"
         inside = "-" if one["inside"] is None else f"{100.0 * one['inside']:.0f}"
-        there = "; ".join(ingested(given.store, one["voyage"])) if (
-            given.store / f"voyage={one['voyage']}"
-        ).exists() else "not in the store"  # fmt: skip
-        own = "; ".join(dict.fromkeys(diagnosed(verdict, one["voyage"])))
-        said = one["said"] or [{"second": "", "what": "", "sentence": "nothing"}]
-        for i, word in enumerate(said):
-            kind = f"{word['what']}: " if word["what"] else ""
-            head = (
-                f"| {one['voyage']} | {'yes' if one['trained'] else 'no'} | {one['seconds']:.0f} | "
-                f"{one['segments']} | {most} | {inside} |" if i == 0 else "| | | | | | |"
-            )  # fmt: skip
-            tail = f" {there or '-'} | {own or '-'} |" if i == 0 else " | |"
-            yield f"{head} {word['second']} | {kind}{word['sentence']} |{tail}"
+        yield (
+            f"| {one['voyage']} | {'yes' if one['trained'] else 'no'} | {one['seconds']:.0f} | "
+            f"{one['segments']} | {most} | {inside} | {len(one['said'])} |"
+        )
+    yield "\n## What is said of each\n"
+    yield "| voyage | by | at s | sentence |"
+    yield "| --- | --- | ---: | --- |"
+    for one in lines:
+        for word in one["said"]:
+            yield (
+                f"| {one['voyage']} | watch, {word['what']} | {word['second']:.1f} | "
+                f"{word['sentence']} |"
+            )
+        for by, sentences in (
+            ("ingest", ingested(given.store, one["voyage"])),
+            ("diagnose", list(dict.fromkeys(diagnosed(verdict, one["voyage"])))),
+        ):
+            for words in sentences:
+                yield f"| {one['voyage']} | {by} | | {words} |"
 
 
 def main() -> None:
@@ -143,11 +160,16 @@ def main() -> None:
     parser.add_argument("--per-day", type=float, default=24.0)
     parser.add_argument("--report", action="store_true")
     parser.add_argument("--verdict", type=Path)
+    parser.add_argument("--markdown", type=Path)
     given = parser.parse_args()
     if not given.report:
         with threadpool_limits(1, user_api="blas"):
             watch_all(given)
-    print(*report(given), sep="\n")
+    text = "\n".join(report(given)) + "\n"
+    if given.markdown is None:
+        print(text)
+    else:
+        given.markdown.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

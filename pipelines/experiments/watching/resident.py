@@ -6,7 +6,8 @@
 The first replays a log and prints the memory of the process step by step. The second hands the
 log's messages over as they were recorded, ten times a second and more, their stamps moved to now,
 and looks every `LOOK_S` as `shiplog watch` does. Latency is from the moment at which a message was
-recorded to the provisional point that it makes; a point's age is from the row's own time.
+recorded to the provisional point that it makes; the processor time of a look says what that would
+be on a core of its own.
 """
 
 from __future__ import annotations
@@ -85,19 +86,25 @@ def moved(path: Path, run, seconds: float) -> Recorded:
     )  # fmt: skip
 
 
-def latencies(watch: Watch) -> tuple[np.ndarray, np.ndarray]:
-    """[n] from a message to its provisional point, and [n] the points' ages, s."""
-    found, ages, newest = [], [], 0
+def latencies(watch: Watch) -> dict[str, np.ndarray]:
+    """Of each look that had new messages [n], s: from the newest one to its provisional point, the
+    age of that point's row, and the processor time of the look."""
+    found: dict[str, list[float]] = {"message to point": [], "age of its row": [], "work": []}
+    newest = 0
     while not watch.done:
+        began, point = time.process_time(), None
         for event in watch.step(time.time_ns()):
-            now = time.time_ns()
-            if isinstance(event, Point) and event.provisional and watch.window.newest > newest:
-                newest = watch.window.newest
-                found.append((now - newest) / SECOND_NS)
-                ages.append((now - event.time) / SECOND_NS)
+            if isinstance(event, Point) and event.provisional:
+                point = event
+        now, work = time.time_ns(), time.process_time() - began
+        if point is not None and watch.window.newest > newest:
+            newest = watch.window.newest
+            for what, value in zip(found, (now - newest, now - point.time), strict=False):
+                found[what].append(value / SECOND_NS)
+            found["work"].append(work)
         if not watch.busy:
             time.sleep(watch_pace.LOOK_S)
-    return np.array(found), np.array(ages)
+    return {what: np.array(values) for what, values in found.items()}
 
 
 def held(watch: Watch) -> Iterator[tuple[str, float]]:
@@ -131,12 +138,11 @@ def main() -> None:
         campaign, calibration = prepared
         watcher = calibration.watcher(6.0)
         if given.latency:
-            found, ages = latencies(
-                Watch(run, moved(given.log, run, given.latency), campaign, calibration, watcher)
-            )
-            for what, of in (("message to point", found), ("age of the point", ages)):
-                middle, most = np.quantile(of, [0.5, 0.95])
-                print(f"{what}: median {middle:.3f} s, 95 % below {most:.3f} s, {len(of)} points")
+            source = moved(given.log, run, given.latency)
+            watch = Watch(run, source, campaign, calibration, watcher)
+            for what, values in latencies(watch).items():
+                middle, most = np.quantile(values, [0.5, 0.95])
+                print(f"{what}: {middle:.3f} s, 95 % below {most:.3f} s, {len(values)} looks")
             return
         source = sources.opened(str(given.log), fields_read.wanted(run.profile, {}), None)
         for what, resident in held(Watch(run, source, campaign, calibration, watcher)):
