@@ -118,7 +118,10 @@ def report(given: argparse.Namespace) -> Iterator[str]:
     lines = done(given.out)
     verdict = None if given.verdict is None else json.loads(given.verdict.read_text("utf-8"))
     whole, cpu = sum(one["seconds"] for one in lines), sum(one["cpu_s"] for one in lines)
-    alarms = [w for one in lines for w in one["said"] if w["what"] == "alarm"]
+    alarms = [
+        w for one in lines for w in one["said"]
+        if w["what"] == "alarm" and not w["sentence"].startswith("Still")
+    ]  # fmt: skip
     yield TITLE
     yield (
         f"{len(lines)} voyages of {whole / 3600.0:.2f} h at {given.per_day:g} false alarms a day, "
@@ -146,7 +149,7 @@ def report(given: argparse.Namespace) -> Iterator[str]:
                 f"{word['sentence']} |"
             )
         for by, sentences in (
-            ("ingest", ingested(given.store, one["voyage"])),
+            ("ingest", [" ".join(ingested(given.store, one["voyage"])) or "nothing"]),
             ("diagnose", list(dict.fromkeys(diagnosed(verdict, one["voyage"])))),
         ):
             for words in sentences:

@@ -69,6 +69,11 @@ def main() -> None:
     parser.add_argument("ship")
     parser.add_argument("--legs", type=int, default=2)
     given = parser.parse_args()
+    with threadpool_limits(1, user_api="blas"):  # of matrices too small to share out
+        compare(given)
+
+
+def compare(given: argparse.Namespace) -> None:
     (ship,) = (s for s in sailing.FIVE if s.name == given.ship)
     run = load_model.load(given.ships / ship.name / "base")
     of, known = segments_kept.campaign_of(given.ships / ship.name), rates.known(given.kept)
@@ -78,20 +83,19 @@ def main() -> None:
         series = sailing.leg(ship, number)
         reading = sailing.reading_of(series, profile, sailing.home_instruments.DATUM)
         record = sailing.record_of(series, profile)
-        with threadpool_limits(1, user_api="blas"):
-            H = segments_kept.products(of, record, directions)
-            for per_day in RATES:
-                own = known[ship.name].watcher(per_day)
-                watcher = Watcher(directions, own.thresholds, own.median)
-                source = Recorded(reading.frames, reading.contents.metadata)
-                one, raised = live(run, of, source, watcher)
-                other, expected = batch(known[ship.name], H, per_day)
-                apart = np.abs(np.array(one) - other).max() if len(one) == len(other) else np.nan
-                print(
-                    f"{ship.name} leg {number}, {per_day:g} a day: {len(one)} and {len(other)} "
-                    f"segments, {apart:.2g} nats apart, alarms at {raised} and {expected}",
-                    flush=True,
-                )
+        H = segments_kept.products(of, record, directions)
+        for per_day in RATES:
+            own = known[ship.name].watcher(per_day)
+            watcher = Watcher(directions, own.thresholds, own.median)
+            source = Recorded(reading.frames, reading.contents.metadata)
+            one, raised = live(run, of, source, watcher)
+            other, expected = batch(known[ship.name], H, per_day)
+            apart = np.abs(np.array(one) - other).max() if len(one) == len(other) else np.nan
+            print(
+                f"{ship.name} leg {number}, {per_day:g} a day: {len(one)} and {len(other)} "
+                f"segments, {apart:.2g} nats apart, alarms at {raised} and {expected}",
+                flush=True,
+            )
 
 
 if __name__ == "__main__":
