@@ -189,14 +189,19 @@ class Straight(Trial):
     given: Linear | None = None
 
     def linearise(self, numbers, near=None, noise_factor=None, remainder=None) -> Point:
+        return self.linearise_about(numbers, replace(self.own.path))
+
+    @property
+    def own(self) -> Linear:
+        """The pass of its segments, which may be some of those that are given."""
         assert self.given is not None
-        return self.linearise_about(numbers, replace(self.given.path))
+        kept = np.isin(self.given.cut.rows, self.rows)
+        return self.given if kept.all() else self.given.pick(kept)
 
     def linearise_about(self, numbers, path) -> Point:
-        assert self.given is not None
-        columns = self.reference.columns
+        given, columns = self.own, self.reference.columns
         d = np.concatenate((np.zeros(columns.base), columns.numbers(dict(numbers))))
-        linear = replace(self.given, e=self.given.e - self.given.j @ d, path=path)
+        linear = replace(given, e=given.e - given.j @ d, path=path)
         return self._refuse_divergent(Point(dict(numbers), path, linear))
 
 

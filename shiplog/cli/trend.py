@@ -69,7 +69,7 @@ def trend(
 
     with loading():
         from shiplog.commands.trend import trend_of, write_page
-        from shiplog.diagnosis.season.trends import parse_date, parse_limit
+        from shiplog.diagnosis.season.asked import parse_date, parse_limit
     from shiplog.voyages.store.store import Store
 
     found = trend_of(

@@ -528,7 +528,7 @@ def trend(
     Raises ShiplogError.
     """
     from shiplog.commands import trend as following
-    from shiplog.diagnosis.season.trends import parse_date
+    from shiplog.diagnosis.season.asked import parse_date
 
     (path,) = _runs(run)
     return following.trend_of(

@@ -241,7 +241,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> Diagnosis:
         notes.append(held.hint)
     starts = voyage_starts.dated(store, names)
     courses = onsets.of_decision(tried, decision, starts)
-    seasons = trends.of_courses(tried, decision.named, courses, starts)
+    seasons = trends.of_verdict(tried, decision.fit, decision.named, starts)
     simulated = (tried, decision)
     if network is not None:
         simulated = network.extended_by(decision)

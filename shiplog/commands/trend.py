@@ -68,7 +68,7 @@ def trend_of(
     trial, fit, labels = _followed(run, nominal, recorded, causes, [*of, *(limits or {})], store)
     reach("season")
     found = trends.of_fit(trial, fit, labels, starts, events, limits)
-    water = season_fit.water_of(fit)
+    water = season_fit.water_of(found)
     losses = speed_loss.of_voyages(trial, trends.nominal_theta(trial), water)
     order = trial.record.names
     notes = [] if found else [NO_CAUSE]

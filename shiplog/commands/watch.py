@@ -12,7 +12,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from shiplog.live import calibration, kept, nominal, sources, summary, watch_pace
+from shiplog.live import kept, nominal, preparation, sources, summary, watch_pace
 from shiplog.live.alarm import Alarm
 from shiplog.live.events import Event, as_json
 from shiplog.live.session import Watch
@@ -74,7 +74,7 @@ def watch_command(
     saved = None if anew else kept.load(out)
     place = None if saved is None else saved.facts.get("place")
     opened = sources.opened(source, fields_read.wanted(run.profile, {}), place)
-    watch = _prepared(run, store, opened, out, per_day, reporter)
+    watch = _prepared(run, run_path, store, opened, out, per_day, reporter)
     if saved is not None and watch.resume(saved):
         reporter.fact(*summary.resumed(watch))
     pace = watch_pace.Pace(stop_after_s)
@@ -97,16 +97,17 @@ def watch_command(
 
 
 def _prepared(
-    run: Run, store: Store, opened: sources.Source, out: Path, per_day: float, reporter: Reporter
-) -> Watch:
+    run: Run, run_path: Path, store: Store, opened: sources.Source, out: Path, per_day: float,
+    reporter: Reporter,
+) -> Watch:  # fmt: skip
     why = nominal.why_none(run, store)
-    campaign = None if why else nominal.nominal(run, store)
-    if campaign is None:
+    prepared = None if why else preparation.campaign_of(run, run_path, store)
+    if prepared is None:
         reporter.fact(*summary.without_alarm(why))
         return Watch(run, opened, out=out)
-    found = calibration.calibrated(campaign)
+    campaign, found = prepared
     reporter.fact(*summary.begun(found, per_day))
-    return Watch(run, opened, campaign.without_segments(), found, found.watcher(per_day), out)
+    return Watch(run, opened, campaign, found, found.watcher(per_day), out)
 
 
 def _propose(

@@ -17,6 +17,9 @@ from shiplog.diagnosis.nominal import nominal_cache, nominal_campaign
 from shiplog.diagnosis.nominal.nominal_campaign import Campaign
 from shiplog.diagnosis.trial import trial_voyages
 from shiplog.models import causes as catalogue
+from shiplog.models.causes import Setting
+from shiplog.models.extended import Extended
+from shiplog.models.starting_values import Start
 from shiplog.training.runs.load_model import Run
 from shiplog.voyages.rows.recording import Record
 from shiplog.voyages.rows.timescale import Timescale
@@ -70,21 +73,39 @@ def why_none(run: Run, store: Store) -> str:
 def nominal(run: Run, store: Store) -> Nominal | None:
     """The nominal campaign; None where it is too short. Raises np.linalg.LinAlgError where the
     model diverges on it."""
-    there = store.there(run.trained_on)
-    record = trial_voyages.record_of(store, there, store.profile(there))
-    scaled, _ = trial_voyages.rescale_time(run, record, record)
-    assert scaled is not None
+    scaled = _record(run, store)
     if len(segments.begins(scaled)) < LEAST_SEGMENTS:
         return None
+    setting, plain, model, start = _models(run, scaled)
+    at = nominal_cache.converged(plain, setting, start, scaled)
+    found = nominal_cache.characteristics(plain, setting, start, scaled, at)
+    return Nominal(scaled, nominal_campaign.learn(model, setting, start, scaled, at, found))
+
+
+def is_kept(run: Run, store: Store) -> bool:
+    """Whether its fit was made before, and only has to be read."""
+    scaled = _record(run, store)
+    setting, plain, _, start = _models(run, scaled)
+    return nominal_cache.is_kept(plain, setting, start, scaled)
+
+
+def _models(run: Run, scaled: Record) -> tuple[Setting, Extended, Extended, Start]:
+    """The model that is fitted, with all causes that can be tested, and that with the bank."""
     setting = trial_voyages.setting_of(run, scaled, scaled)
     testable, _ = catalogue.testable(setting)
     plain, _ = trial_voyages.model_of(run, testable, setting)
     bank = [cause for cause in testable if cause.name in BANK]
     model, start = trial_voyages.model_of(run, bank, setting)
-    start = nominal_campaign.widen(plain, setting, start)
-    at = nominal_cache.converged(plain, setting, start, scaled)
-    found = nominal_cache.characteristics(plain, setting, start, scaled, at)
-    return Nominal(scaled, nominal_campaign.learn(model, setting, start, scaled, at, found))
+    return setting, plain, model, nominal_campaign.widen(plain, setting, start)
+
+
+def _record(run: Run, store: Store) -> Record:
+    """The training voyages at 10 Hz, in the ship's time scale."""
+    there = store.there(run.trained_on)
+    record = trial_voyages.record_of(store, there, store.profile(there))
+    scaled, _ = trial_voyages.rescale_time(run, record, record)
+    assert scaled is not None
+    return scaled
 
 
 def bank_columns(campaign: Campaign) -> dict[str, np.ndarray]:

@@ -1,4 +1,5 @@
-"""The gate on the sample logs, with the limits of its page: season 3 passes, season 2 does not.
+"""The gate on the sample logs, with the limits of its page: season 3 passes, season 2 does not. And
+both seasons followed together, which are far from each other.
 
 Where SHIPLOG_SEASONS names a folder, store, run, limits and diagnosis stay in it for what CI does
 next.
@@ -6,6 +7,7 @@ next.
 
 from __future__ import annotations
 
+import json
 import os
 import re
 from pathlib import Path
@@ -13,6 +15,8 @@ from pathlib import Path
 import pytest
 from commands import call
 from junitparser import JUnitXml
+
+import shiplog
 
 pytestmark = pytest.mark.long
 ROOT = Path(__file__).parents[2]
@@ -76,3 +80,25 @@ def test_season_2_fails_for_its_current(seasons):
     failed = {case.name: case.result[0].message for case in suite if case.result}
     assert "A steady current of 0.1" in failed["current.speed, at most 0.03 m/s"]
     assert found == states(block("season 2"))
+
+
+@pytest.mark.nightly
+def test_each_voyage_of_two_seasons_has_its_own_current_and_clock(seasons):
+    """What was hidden in season 2, and nothing in season 3."""
+    found = shiplog.trend(
+        seasons / "mmg", seasons / "store", "season*", of=["current", "clock_offset:gnss"]
+    )
+    key = json.loads((ROOT / "sample_logs" / "answers" / "key.json").read_text(encoding="utf-8"))
+    current, clock = found.trends
+    for one, other in zip(current.voyages, clock.voyages, strict=True):
+        hidden = {c["name"]: c["parameters"] for c in key[one.voyage]}
+        time = other.pooled["time"]
+        late = hidden["clock_offset"]["time"]["value"] if hidden else 0.0
+        assert time.low < late < time.high < late + 0.2
+        speed, towards = one.pooled["speed"], one.pooled["direction"]
+        if hidden:
+            true = {name: of["value"] for name, of in hidden["current"].items()}
+            assert speed.low < true["speed"] < speed.high < 0.11
+            assert towards.low < true["direction"] < towards.high < true["direction"] + 5.0
+        else:
+            assert speed.high < 0.01

@@ -46,23 +46,27 @@ def fit(trial, numbers, included):
     return Fit(point, made, Remainder())
 
 
-@pytest.mark.parametrize("label", ["drag", "two"])
-def test_every_stretch_counts_as_in_one_dense_gaussian(label):
+@pytest.mark.parametrize("labels", [("drag",), ("two",), ("drag", "two")])
+def test_every_stretch_counts_as_in_one_dense_gaussian(labels):
     trial = switched(3, 8)
-    q = 2 if label == "two" else 1
-    stands = {label: np.full(q, 0.4), "load": np.array([0.2])}
-    of = fit(trial, stands, (label, "load"))
-    told = stretch_information.of_cause(trial, of, label)
+    columns = trial.reference.columns
+    stands = {label: np.full(len(columns.indices[label]), 0.4) for label in labels}
+    of = fit(trial, stands | {"load": np.array([0.2])}, (*labels, "load"))
+    told = stretch_information.of_causes(trial, of, labels, np.arange(SEGMENTS))
+    if len(labels) == 1:
+        alone = stretch_information.of_cause(trial, of, labels[0])
+        assert np.array_equal(alone.y, told.y) and np.array_equal(alone.M, told.M)
     # dense: part's own deviations are in the covariance, voyages' are added here
-    e, j, x, _, c, mean, nominal, _, _, _ = gaussian(trial, of.point, NOISE, (label,))
+    e, j, x, _, c, mean, nominal, _, _, _ = gaussian(trial, of.point, NOISE, labels)
     _, _, other, _, _, _, _, before, _, _ = gaussian(trial, of.point, NOISE, ("load",))
-    rows = len(e) // SEGMENTS
+    rows, q = len(e) // SEGMENTS, x.shape[1]
     deviation = APART * trial.campaign.effects.deviation
     for voyage in (slice(0, 4 * rows), slice(4 * rows, 8 * rows)):
         c[voyage, voyage] += (j[voyage] * deviation**2) @ j[voyage].T
     whole = c / SHARE + j @ nominal @ j.T + other @ other.T
-    units = trial.reference.columns.unit[trial.reference.columns.indices[label]]
-    absent = e + x @ (stands[label] / units) - j @ mean - other @ before
+    at = np.concatenate([columns.indices[label] for label in labels])
+    units, present = columns.unit[at], np.concatenate([stands[label] for label in labels])
+    absent = e + x @ (present / units) - j @ mean - other @ before
     h = np.zeros((len(e), SEGMENTS, q))
     for s in range(SEGMENTS):
         h[s * rows : (s + 1) * rows, s] = x[s * rows : (s + 1) * rows]

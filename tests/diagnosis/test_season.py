@@ -16,8 +16,19 @@ from straight import CAUSES
 from test_onset import fit, switched
 
 from shiplog.diagnosis.onset import stretch_information
-from shiplog.diagnosis.season import limit, pooling, season_fit, speed_loss, trends, voyage_sizes
+from shiplog.diagnosis.season import (
+    asked,
+    limit,
+    own_numbers,
+    pooling,
+    season_fit,
+    speed_loss,
+    trends,
+    voyage_sizes,
+)
 from shiplog.diagnosis.season.pooling import HALF_CAUCHY, LEVEL_SPREAD, SPREADS, Pooled, Voyages
+from shiplog.diagnosis.trial.fitted import Point
+from shiplog.diagnosis.verdict.result import Named
 from shiplog.exceptions import ShiplogError, UsageError
 from shiplog.models.causes import Current, Fouling, ThrustLoss
 from shiplog.ship_profile import file as profiles
@@ -38,7 +49,7 @@ def likelihood(values, errors, days=None, level=None) -> Voyages:
 
 def test_eight_schools_are_pooled_as_numerical_integration_has_it():
     """Posterior means of μ, τ and each effect: p(τ | r) ∝ p(τ) N(r; 0, s² 1 1ᵀ + diag(σ² + τ²))."""
-    pooled = pooling.pool(likelihood(SCHOOLS, ERRORS), wears=False)
+    (pooled,) = pooling.pool(likelihood(SCHOOLS, ERRORS), [False])
     tau = np.geomspace(SPREADS[0], SPREADS[-1], 400)
     together = LEVEL_SPREAD**2 * np.ones((8, 8))
     log_p = np.array([
@@ -60,6 +71,35 @@ def test_eight_schools_are_pooled_as_numerical_integration_has_it():
     assert pooled.sizes[:, 0, 0].std() < pooled.alone[:, 0, 0].std()
 
 
+def test_two_causes_are_pooled_as_numerical_integration_has_it():
+    """Two numbers that each voyage hardly tells apart: means of x and τ over all pairs of τ."""
+    rng = np.random.default_rng(4)
+    true = np.stack((0.4 + 0.3 * rng.standard_normal(4), np.full(4, -0.2)), -1).ravel()
+    block = np.linalg.inv(0.2**2 * np.array([[1.0, -0.8], [-0.8, 1.0]]))
+    information = np.kron(np.eye(4), block)
+    seen = true + np.linalg.cholesky(np.linalg.inv(information)) @ rng.standard_normal(8)
+    of = Voyages(
+        (information @ seen).reshape(4, 2), information.reshape(4, 2, 4, 2), np.arange(4.0),
+        np.zeros(4, dtype=int), (1, 1),
+    )  # fmt: skip
+    first, second = pooling.pool(of, [False, False])
+    # p(τ | r) ∝ p(τ) N(r; 0, K), K the covariance of what is seen, and x | r, τ its mean
+    tau = np.geomspace(SPREADS[0], SPREADS[-1], 50)
+    pairs = np.stack(np.meshgrid(tau, tau), -1).reshape(-1, 2)
+    prior = np.kron(np.full((4, 4), LEVEL_SPREAD**2), np.eye(2)) + np.zeros((len(pairs), 8, 8))
+    prior[:, np.arange(8), np.arange(8)] += np.tile(pairs**2, 4)
+    K = prior + np.linalg.inv(information)
+    solved = np.linalg.solve(K, np.tile(seen[:, None], (len(pairs), 1, 1)))[..., 0]
+    log_p = -0.5 * (solved @ seen + np.linalg.slogdet(K)[1])
+    weight = np.exp(log_p - log_p.max())
+    weight *= (pairs / (1.0 + (pairs / HALF_CAUCHY) ** 2)).prod(1)
+    weight /= weight.sum()
+    sizes, spreads = np.einsum("t,tab,tb->a", weight, prior, solved), weight @ pairs
+    found = np.concatenate((first.sizes, second.sizes), -1).mean(0)
+    assert found.ravel() == pytest.approx(sizes, abs=0.02)
+    assert [first.spread.mean(), second.spread.mean()] == pytest.approx(spreads, rel=0.15)
+
+
 def test_a_slope_and_a_docking_are_found():
     """0.6 of wear over 100 days, and 0.8 taken away after 60 of them; errors of 0.05."""
     rng = np.random.default_rng(2)
@@ -67,11 +107,11 @@ def test_a_slope_and_a_docking_are_found():
     level = (days > 60.0).astype(int)
     values = 0.4 + 0.006 * (days - 50.0) - 0.8 * level + 0.05 * rng.standard_normal(11)
     of = likelihood(values, np.full(11, 0.05), days, level)
-    pooled = pooling.pool(of, wears=True)
+    (pooled,) = pooling.pool(of, [True])
     assert pooled.slope[:, 0].mean() == pytest.approx(0.6, abs=0.15)
     levels = pooled.levels[..., 0].mean(0)
     assert levels == pytest.approx([0.4, -0.4], abs=0.12)
-    assert not pooling.pool(of, wears=False).slope.any()
+    assert not pooling.pool(of, [False])[0].slope.any()
 
 
 def drawn(level: float, slope: float, spread: float) -> Pooled:
@@ -108,7 +148,7 @@ def test_each_voyage_has_its_own_part_of_the_likelihood(monkeypatch):
     assert of.y[1] == pytest.approx(told.y[4:].sum(0))
     assert of.days == pytest.approx([60.0 / 86400.0, 10.0 + 60.0 / 86400.0])
     assert of.level.tolist() == [0, 1]
-    sizes = pooling.pool(of, wears=False).sizes[..., 0].mean(0) * told.unit[0]
+    sizes = pooling.pool(of, [False])[0].sizes[..., 0].mean(0) * told.unit[0]
     assert sizes == pytest.approx([0.0, 1.5], abs=0.25)
     (found,) = trends.of_fit(trial, fit(trial, {}, ("drag",)), ("drag",), starts,
                              [began + timedelta(days=5)])  # fmt: skip
@@ -117,6 +157,76 @@ def test_each_voyage_has_its_own_part_of_the_likelihood(monkeypatch):
     assert change.low < 1.5 < change.high + 0.3
     assert found.voyages[1].pooled["size"].value == pytest.approx(1.5, abs=0.25)
     assert found.slope is None  # two voyages have none
+
+
+DRAG = Named(CAUSES[1], 0.0, 1.0, np.zeros(1), np.eye(1))
+
+
+@dataclass(frozen=True)
+class Bent(straight.Straight):
+    """Two voyages of which drag x is felt as f(x) = x + x²: true[v] of it is in the data."""
+
+    true: tuple[float, ...] = (0.0, 0.0)
+
+    def linearise(self, numbers, near=None, noise_factor=None, remainder=None):
+        given = self.own
+        (column,) = self.reference.columns.indices["drag"]
+        x = float(np.asarray(numbers.get("drag", np.zeros(1)))[0])
+        true = np.array(self.true)[self.record.voyage[self.rows]]
+        felt = (true + true**2) - (x + x**2)
+        j = given.j.copy()
+        e = given.e + felt[:, None, None] * j[..., column]
+        j[..., column] *= 1.0 + 2.0 * x
+        linear = replace(given, e=e, j=j, path=replace(given.path))
+        return Point(dict(numbers), linear.path, linear)
+
+
+def bent(*true: float) -> Bent:
+    columns = straight.columns_of(CAUSES)
+    nominal, record = straight.sailed(12), straight.sailed(16, seed=3)
+    campaign = straight.campaign(nominal, straight.passed(nominal, columns), columns)
+    given = straight.passed(record, columns, seed=2, sensitivity=4.0)  # each size is well known
+    made = Bent.build(campaign, record, given=given, true=true)
+    return replace(made, first=made.linearise({}))
+
+
+def test_a_voyage_that_is_far_from_the_others_is_fitted_by_itself(monkeypatch, caplog):
+    """Drag 0 in one voyage and 1.5 in the other. From x₀, one size for both, the likelihood of a
+    voyage with size x is linear about x₀ + (f(x) - f(x₀))/f'(x₀), x₀ = 0.9: 0.29 and 1.63."""
+    monkeypatch.setattr(trends, "calm_speeds", lambda _, __, numbers: np.ones(len(numbers)))
+    trial = bent(0.0, 1.5)
+    at = season_fit.fitted(trial, trial.first, ("drag",))
+    there = own_numbers.common(trial, at, ("drag",))
+    unit = trial.reference.columns.unit[trial.reference.columns.indices["drag"]]
+    told = own_numbers.information_of(trial, at, ("drag",), there)
+    of, _ = voyage_sizes.by_voyage(trial, told, {})
+    linear = pooling.pool(of, [False])[0].alone[..., 0].mean(0) * unit[0]
+    x0 = float(there.stood[0, 0] * unit[0])
+    wanted = [x0 + (x + x**2 - x0 - x0**2) / (1.0 + 2.0 * x0) for x in trial.true]
+    assert linear == pytest.approx(wanted, abs=0.05)
+    assert min(abs(linear - trial.true)) > 0.08
+    (found,) = trends.of_fit(trial, at, ("drag",), {})
+    for one, true in zip(found.voyages, trial.true, strict=True):
+        size = one.alone["size"]
+        assert size.value == pytest.approx(true, abs=0.05) and size.low < true < size.high
+    assert not caplog.records
+    # of a verdict there is none: it would be the linear one
+    assert (
+        trends.of_verdict(trial, at, [Named(CAUSES[1], 0.0, 1.0, np.zeros(1), np.eye(1))], {}) == {}
+    )
+
+
+def test_voyages_that_are_alike_are_not_fitted_again(monkeypatch):
+    monkeypatch.setattr(trends, "calm_speeds", lambda _, __, numbers: np.ones(len(numbers)))
+    monkeypatch.setattr(own_numbers, "evaluate", None)  # it would fail
+    trial = bent(0.7, 0.75)
+    at = season_fit.fitted(trial, trial.first, ("drag",))
+    (found,) = trends.of_fit(trial, at, ("drag",), {})
+    assert [one.alone["size"].value for one in found.voyages] == pytest.approx(
+        [0.7, 0.75], abs=0.05
+    )
+    named = [Named(CAUSES[1], 0.0, 1.0, np.zeros(1), np.eye(1))]
+    assert trends.of_verdict(trial, at, named, {}).keys() == {"drag"}
 
 
 def test_only_what_wears_has_a_limit():
@@ -128,15 +238,15 @@ def test_only_what_wears_has_a_limit():
 
 @pytest.mark.parametrize("text", ["thrust_loss", "=0.9", "thrust_loss=much", "thrust_loss=nan"])
 def test_a_limit_is_a_cause_and_a_number(text):
-    assert trends.parse_limit("thrust_loss=0.9") == ("thrust_loss", 0.9)
+    assert asked.parse_limit("thrust_loss=0.9") == ("thrust_loss", 0.9)
     with pytest.raises(UsageError, match="no limit"):
-        trends.parse_limit(text)
+        asked.parse_limit(text)
 
 
 def test_a_date_is_iso():
-    assert trends.parse_date("2026-05-17") == datetime(2026, 5, 17, tzinfo=UTC)
+    assert asked.parse_date("2026-05-17") == datetime(2026, 5, 17, tzinfo=UTC)
     with pytest.raises(UsageError, match="no date"):
-        trends.parse_date("17 May")
+        asked.parse_date("17 May")
 
 
 def test_a_cause_is_followed_by_its_name_or_label():
@@ -210,7 +320,7 @@ def test_speed_loss_is_that_of_the_closed_form():
     assert found["v1"].blocks == int(400.0 // (600.0 * math.sqrt(3.0 / 100.0)))
     assert found["v1"].low is not None and found["v1"].low <= found["v1"].value
     # a current of 0.1 STEADY ahead: through the water it is slower by that
-    moved = speed_loss.of_voyages(trial, THETA, (0.1 * STEADY, 0.0))
+    moved = speed_loss.of_voyages(trial, THETA, {"v0": (0.1 * STEADY, 0.0)})
     assert moved["v0"].value == pytest.approx(-10.0, abs=0.05)
 
 

@@ -79,6 +79,12 @@ def characteristics(
     return found
 
 
+def is_kept(model: Extended, setting: Setting, start: Start, record: Record) -> bool:
+    """Whether both have been worked out before."""
+    folder, key = disk_cache.folder() / "settled", _key(model, setting, start, record)
+    return all((folder / f"{key}{end}").exists() for end in (".npz", ".characteristics.npz"))
+
+
 def _read(kept: File) -> dict | None:
     """Arrays of a file; None where it is missing or damaged, and has to be computed again."""
     try:

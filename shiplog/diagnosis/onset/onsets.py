@@ -61,14 +61,10 @@ class Onset:
 
 @dataclass(frozen=True)
 class Course:
-    """What is said of one named cause: an onset, or a slope.
-
-    information   its information in the stretches of the trial
-    """
+    """What is said of one named cause: an onset, or a slope; neither of a trial that is short."""
 
     onset: Onset | None = None
     slope: Slope | None = None
-    information: Stretches | None = None
 
 
 def of_decision(
@@ -94,13 +90,10 @@ def _course(
 ) -> Course:  # fmt: skip
     information = stretch_information.of_cause(trial, decision.fit, one.cause.label)
     if one.cause.drifts:
-        return Course(
-            slope=drift.slope(trial, information, one.cause, starts, one.freedom),
-            information=information,
-        )
+        return Course(slope=drift.slope(trial, information, one.cause, starts, one.freedom))
     if len(information.first) < FEWEST:
-        return Course(information=information)
-    return Course(onset=onset(trial, information, one), information=information)
+        return Course()
+    return Course(onset=onset(trial, information, one))
 
 
 def onset(trial: Trial, information: Stretches, one: Named) -> Onset:

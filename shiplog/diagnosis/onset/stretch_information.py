@@ -16,23 +16,27 @@ with A and the posterior mean m = A⁻¹ b of (6) and (7):
     y_s = c (T̄_s[0] - mᵀ T̄_s[N]),   M_st = c M'_st - c² T̄_s[N]ᵀ A⁻¹ T̄_t[N]
 
 Segments of one stretch are added. Nothing is kept of a segment but T̄_s and M' of its voyage.
+
+Several causes may be asked for together, their numbers one after another; and a voyage may have
+been linearised at numbers of its own (`Piece`), J_s and r then being those there.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from shiplog.diagnosis.hypotheses import evidence
+from shiplog.diagnosis.linear.parameter_layout import Columns
 from shiplog.diagnosis.noise import likelihood
 from shiplog.diagnosis.noise.likelihood import InverseKernels
 from shiplog.diagnosis.noise.remainder import NOMINAL, RAISED, Remainder
 from shiplog.diagnosis.nominal.voyage_effects import inverse_and_volume
-from shiplog.diagnosis.trial.fitted import Fit
+from shiplog.diagnosis.trial.fitted import Fit, Level, Point
 from shiplog.diagnosis.trial.trial import Trial
 
 MOST_STRETCHES = 400  # of a trial: M has their square, and all pairs of them are weighed
@@ -54,26 +58,52 @@ class Stretches:
     unit: np.ndarray
 
 
+@dataclass(frozen=True)
+class Piece:
+    """Some voyages of a trial, linearised where their own numbers stand.
+
+    trial    of their segments alone
+    point    of these
+    rows     [S] of them among the segments of the whole trial
+    noise    λ of them
+    """
+
+    trial: Trial
+    point: Point
+    rows: np.ndarray
+    noise: float
+
+
 def of_cause(trial: Trial, fit: Fit, label: str) -> Stretches:
     """y and M of a cause of the hypothesis `fit`. Raises np.linalg.LinAlgError where a matrix is
     not positive definite."""
-    remainder, ref = without_time(fit.remainder), trial.reference
-    noise, included = fit.estimate.noise_factor, tuple(n for n in fit.included if n != label)
-    columns = ref.columns.indices[label]
-    unit = ref.columns.unit[columns]
-    present = np.asarray(fit.point.numbers.get(label, np.zeros(len(columns)))) / unit
-    total = trial.products.total(fit.point, noise, trial.weight, remainder).G
-    level = evidence.solve(
-        trial, absent(total, columns, present), 0.0, noise, fit.point, included, remainder
-    )
-    others = 1 + evidence.columns_of(trial, included, remainder)
+    return of_causes(trial, fit, (label,), first_of_stretches(trial))
+
+
+def of_causes(
+    trial: Trial, fit: Fit, labels: Sequence[str], first: np.ndarray, pieces: Sequence[Piece] = ()
+) -> Stretches:
+    """y and M of several causes, their numbers one after another. Raises as `of_cause`.
+
+    first    of the stretches, among the segments of the trial; none crosses two voyages
+    pieces   that the trial consists of, in its order; unless given, all of it where the fit stands
+    """
+    noise, ref = fit.estimate.noise_factor, trial.reference
+    pieces = pieces or (Piece(trial, fit.point, np.arange(len(trial.rows)), noise),)
+    columns = np.concatenate([ref.columns.indices[label] for label in labels])
+    stands = [numbers_at(one.point.numbers, ref.columns, labels) for one in pieces]
+    remainder = without_time(fit.remainder)
+    of = [Asked(columns, present, remainder) for present in stands]
+    level = _of_others(trial, fit, labels, [*zip(pieces, of, strict=True)])
+    others = 1 + evidence.columns_of(trial, _without(fit, labels), remainder)
     c = ref.counts
-    first = first_of_stretches(trial)
+    stretch = np.searchsorted(first, np.arange(len(trial.rows)), side="right") - 1
     y, across, own = [], [], []
-    for part in _each_voyage(trial, fit, remainder, columns, present, first):
-        y.append(part.T[:, 0] - np.einsum("n,bnq->bq", level.mean, part.T[:, others]))
-        across.append(part.T[:, others])
-        own.append(part.M)
+    for piece, asked in zip(pieces, of, strict=True):
+        for part in _each_voyage(piece, asked, stretch[piece.rows]):
+            y.append(part.T[:, 0] - np.einsum("n,bnq->bq", level.mean, part.T[:, others]))
+            across.append(part.T[:, others])
+            own.append(part.M)
     T = np.concatenate(across)
     B, N, q = T.shape
     X = np.moveaxis(T, 1, 0).reshape(N, B * q)
@@ -83,7 +113,41 @@ def of_cause(trial: Trial, fit: Fit, label: str) -> Stretches:
         size = len(block)
         M[at : at + size, at : at + size] += c * block
         at += size
+    unit = ref.columns.unit[columns]
     return Stretches(c * np.concatenate(y), M.reshape(B, q, B, q), first, unit)
+
+
+def _of_others(
+    trial: Trial, fit: Fit, labels: Sequence[str], pieces: Sequence[tuple[Piece, Asked]]
+) -> Level:
+    """Posterior of all numbers but those of the causes in question, which are absent."""
+    total = sum(absent(_whole(piece, of), of.columns, of.present) for piece, of in pieces)
+    assert isinstance(total, np.ndarray)
+    return evidence.solve(
+        trial, total, 0.0, fit.estimate.noise_factor, fit.point, _without(fit, labels),
+        pieces[0][1].remainder,
+    )  # fmt: skip
+
+
+def _whole(piece: Piece, of: Asked) -> np.ndarray:
+    """G [1 + C, 1 + C] of a piece."""
+    trial = piece.trial
+    return trial.products.total(piece.point, piece.noise, trial.weight, of.remainder).G
+
+
+def _without(fit: Fit, labels: Sequence[str]) -> tuple[str, ...]:
+    return tuple(name for name in fit.included if name not in labels)
+
+
+def numbers_at(
+    numbers: Mapping[str, np.ndarray], columns: Columns, labels: Sequence[str]
+) -> np.ndarray:
+    """Numbers [q] of some causes, one after another, in units; zero of those without."""
+    own = [columns.indices[label] for label in labels]
+    return np.concatenate([
+        np.asarray(numbers.get(label, np.zeros(len(at)))) / columns.unit[at]
+        for label, at in zip(labels, own, strict=True)
+    ])  # fmt: skip
 
 
 def without_time(remainder: Remainder) -> Remainder:
@@ -121,21 +185,31 @@ class _Voyage:
     M: np.ndarray
 
 
-def _each_voyage(
-    trial: Trial, fit: Fit, remainder: Remainder, columns: np.ndarray, present: np.ndarray,
-    first: np.ndarray,
-) -> Iterator[_Voyage]:  # fmt: skip
-    """One voyage after another, their own deviations and those of their parts integrated out."""
-    noise, products = fit.estimate.noise_factor, trial.products
+@dataclass(frozen=True)
+class Asked:
+    """Columns [q] of the causes in question, their numbers `present` [q] where the voyages were
+    linearised, in units, and what remains together with them."""
+
+    columns: np.ndarray
+    present: np.ndarray
+    remainder: Remainder
+
+
+def _each_voyage(piece: Piece, of: Asked, stretch: np.ndarray) -> Iterator[_Voyage]:
+    """One voyage after another, their own deviations and those of their parts integrated out.
+
+    stretch   [S] of each segment of the piece
+    """
+    trial, point, noise, remainder = piece.trial, piece.point, piece.noise, of.remainder
+    products = trial.products
     deviation = products.deviation(remainder)
     between = trial.campaign.apart * deviation
-    stretch = np.searchsorted(first, np.arange(len(trial.rows)), side="right") - 1
-    prior = products.process_noise(fit.point.linear.cut, noise, remainder).inverse_kernels(
+    prior = products.process_noise(point.linear.cut, noise, remainder).inverse_kernels(
         trial.grid.nodes
     )
     each = zip(
         trial.voyage.tolist(), trial.parts,
-        products.each_part(fit.point, noise, trial.weight, remainder), strict=True,
+        products.each_part(point, noise, trial.weight, remainder), strict=True,
     )  # fmt: skip
     for _, grouped in itertools.groupby(each, key=lambda one: one[0]):
         own = list(grouped)
@@ -144,9 +218,9 @@ def _each_voyage(
         spread = np.hypot(between, deviation) if alone else between
         G_v, of_parts = 0.0, []
         for _, rows, gram in own:
-            G = absent(gram.G, columns, present)
-            T = _segment_products(trial, fit, rows, columns, present, prior, len(G))
-            T, M = _added(T, 1 + columns, stretch[rows])
+            G = absent(gram.G, of.columns, of.present)
+            T = _segment_products(piece, rows, of, prior, len(G))
+            T, M = _added(T, 1 + of.columns, stretch[rows])
             B = _covariance(G, within)
             BT = _times(B, T)
             of_parts.append((T - _times(G, BT), M - _between(T, BT)))
@@ -175,13 +249,13 @@ def _of_voyage(
 
 
 def _segment_products(
-    trial: Trial, fit: Fit, rows: np.ndarray, columns: np.ndarray, present: np.ndarray,
-    prior: InverseKernels, size: int,
+    piece: Piece, rows: np.ndarray, of: Asked, prior: InverseKernels, size: int
 ) -> np.ndarray:  # fmt: skip
     """T_s = w_s E_sᵀ C_s⁻¹ h_s [S, 1 + C, q] of a part's segments, E = [r | J | Zₐ Φ] where the
     cause is absent, by the three eliminations of `noise`; `size` is 1 + C."""
+    trial, columns, present = piece.trial, of.columns, of.present
     ref = trial.reference
-    own, w = fit.point.linear.pick(rows), trial.weight[rows]
+    own, w = piece.point.linear.pick(rows), trial.weight[rows]
     process_noise = ref.process_noise
     white = likelihood.Whitening(own.cut.used, process_noise)
     E = white(np.concatenate((own.e[..., None], own.j), -1))

@@ -1,8 +1,8 @@
 """A season: how large a cause is from voyage to voyage, and where that leads.
 
-The hypothesis holds the causes in question, fitted to all voyages at once. Of one of them, y and M
-of equation (17), the room `onset`, added over each voyage's stretches, are the likelihood of a size
-of its own in each of the V voyages, the nominal numbers and the other causes integrated out:
+The hypothesis holds the causes in question, fitted to all voyages at once. Of all of them together,
+y and M of equation (17), the room `onset`, a stretch a voyage, are the likelihood of sizes of their
+own in each of the V voyages, the nominal numbers integrated out:
 
     log p(r | x) = yᵀ x - ½ xᵀ M x + constant,   x = (x_1 … x_V), each [q]                (21)
 
@@ -21,8 +21,12 @@ With w = (μ, β, u), u_v = x_v less its mean, x = B w, a τ gives a Gaussian:
     A = Bᵀ M B + P⁻¹,   w | r, τ ~ N(A⁻¹ Bᵀ y, A⁻¹),   P = diag(s², 1, τ²)
     log p(r | τ) = ½ yᵀ B A⁻¹ Bᵀ y - ½ log|A| - ½ log|P|                                  (23)
 
-τ is integrated out on a grid (`pooling`). The date at which the trend passes a limit x* is that of
-μ_G + β t = x*, G the last stretch, over the draws of w (`limit`).
+Each cause has a τ of its own; they are integrated out on a grid, those of several causes by Gibbs
+sampling with w integrated out (`pooling`). (21) is linear about what all voyages have in common; a
+voyage that is far from it is fitted by itself first (`own_numbers`).
+
+The date at which the trend passes a limit x* is that of μ_G + β t = x*, G the last stretch, over
+the draws of w (`limit`).
 
 `speed_loss` is of the log and the model alone: the speed through the water of steady blocks over
 that of the model at the same revolutions, in the sense of ISO 19030-2:2016.

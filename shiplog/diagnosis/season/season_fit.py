@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,6 +11,7 @@ from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.hypotheses.evaluate import evaluate
 from shiplog.diagnosis.hypotheses.hypothesis import name_of
 from shiplog.diagnosis.noise.remainder import RAISED, Remainder
+from shiplog.diagnosis.season.trends import Trend
 from shiplog.diagnosis.trial.fitted import Fit, Point, Start
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.exceptions import ShiplogError, UsageError, listed
@@ -50,10 +52,13 @@ def fitted(trial: Trial, point: Point, labels: Sequence[str]) -> Fit:
     return fit
 
 
-def water_of(fit: Fit) -> tuple[float, float]:
-    """Velocity of the water along x₀ and y₀ [m/s], where a current is one of the causes."""
-    current = fit.estimate.numbers.get("current")
-    return (0.0, 0.0) if current is None else (float(current[0]), float(current[1]))
+def water_of(found: Sequence[Trend]) -> dict[str, tuple[float, float]]:
+    """Voyage → velocity of the water along x₀ and y₀ [m/s], where a current is a cause."""
+    water = {}
+    for one in (v for trend in found if trend.label == "current" for v in trend.voyages):
+        speed, towards = one.pooled["speed"].value, math.radians(one.pooled["direction"].value)
+        water[one.voyage] = (speed * math.cos(towards), speed * math.sin(towards))
+    return water
 
 
 def refuse_little(recorded: Record, enough: bool) -> None:

@@ -59,11 +59,11 @@ class SpeedLoss:
 
 
 def of_voyages(
-    trial: Trial, theta: np.ndarray, current: tuple[float, float] = (0.0, 0.0)
+    trial: Trial, theta: np.ndarray, water: Mapping[str, tuple[float, float]] | None = None
 ) -> dict[str, SpeedLoss]:
     """Voyage → V_d, by a model with coefficients θ [C], its causes' numbers zero or as they stand.
 
-    current   velocity of the water along x₀ and y₀ [m/s]
+    water   its velocity along x₀ and y₀ [m/s] in each voyage; where none is given it stands
     """
     record = trial.record
     speed = np.hypot(record.state[:, 1], record.state[:, 3])
@@ -71,6 +71,7 @@ def of_voyages(
     found = {}
     for v, name in enumerate(record.names):
         out: Counter[str] = Counter()
+        current = (water or {}).get(name, (0.0, 0.0))
         blocks = [
             one for rows in _blocks(record, v)
             if (one := _block(trial, rows, current, SLOWEST * working, out)) is not None

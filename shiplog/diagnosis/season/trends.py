@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 
 import numpy as np
 
-from shiplog.diagnosis.onset import stretch_information
 from shiplog.diagnosis.onset.drift import DAY_S, Slope
-from shiplog.diagnosis.onset.onsets import Course
 from shiplog.diagnosis.onset.stretch_information import Stretches
-from shiplog.diagnosis.season import limit, pooling, speed_loss, voyage_sizes
+from shiplog.diagnosis.season import limit, own_numbers, pooling, speed_loss, voyage_sizes
 from shiplog.diagnosis.season.pooling import Pooled, Voyages
 from shiplog.diagnosis.trial.fitted import Fit
 from shiplog.diagnosis.trial.trial import Trial
@@ -26,10 +23,6 @@ from shiplog.models.causes import Cause, ParameterEstimate, si
 log = logging.getLogger(__name__)
 
 TAIL = (0.05, 0.95)
-# Standard deviations that voyages are apart, from which a likelihood that is linear about what they
-# have in common is no longer theirs: on the sample logs a current of 0.10 m/s in one season of four
-# comes out as 0.09, and a clock that is 0.33 s late as 0.12 s.
-FAR = 8.0
 MOST_VOYAGES = 60  # of a verdict's view of its season
 WEARS = "ship"  # kind of causes that wear along a season: hull, screws, rudders
 BULK = (0.005, 0.995)  # of the draws: the calm speed of those beyond is that of the end
@@ -104,7 +97,8 @@ def of_fit(
     trial: Trial, fit: Fit, labels: Sequence[str], starts: Mapping[str, datetime],
     events: Sequence[datetime] = (), limits: Mapping[str, float] | None = None,
 ) -> tuple[Trend, ...]:  # fmt: skip
-    """Of the causes `labels` of a hypothesis that holds them all.
+    """Of the causes `labels` of a hypothesis that holds them all, each with sizes of its own in
+    each voyage. A voyage that is far from what all have in common is fitted by itself.
 
     starts   when each voyage began; without those whose recorder knows no date
     events   dates at which every cause may have changed, such as dockings
@@ -112,16 +106,17 @@ def of_fit(
 
     Raises ShiplogError where the model diverges.
     """
-    by = {c.label: c for c in trial.reference.model.causes}
+    if not labels:
+        return ()
     try:
-        seasons = {
-            label: _Season.of(
-                trial, stretch_information.of_cause(trial, fit, label), by[label], starts, events
-            )
-            for label in labels
-        }
-        _warn_of_far(seasons)
-        return tuple(of.trend((limits or {}).get(label)) for label, of in seasons.items())
+        there = own_numbers.common(trial, fit, labels)
+        information = own_numbers.information_of(trial, fit, labels, there)
+        if there.far(information).any():
+            there = own_numbers.fitted_alone(trial, fit, labels, there, information)
+            information = own_numbers.information_of(trial, fit, labels, there)
+            _warn_of_far(trial, there.far(information))
+        seasons = _together(trial, information, labels, starts, events)
+        return tuple(of.trend((limits or {}).get(of.cause.label)) for of in seasons)
     except np.linalg.LinAlgError as error:
         raise ShiplogError(
             "The causes could not be followed: the model diverges on these voyages.",
@@ -129,35 +124,54 @@ def of_fit(
         ) from error
 
 
-def _warn_of_far(seasons: Mapping[str, _Season]) -> None:
-    """Say which voyages are FAR from what all have in common."""
-    far = dict.fromkeys(name for of in seasons.values() for name in of.far)
-    if far:
+def _warn_of_far(trial: Trial, far: np.ndarray) -> None:
+    """Say which voyages [V] are far from where they were linearised, after all."""
+    if far.any():
+        voyages = np.unique(trial.record.voyage[trial.rows])[far]
         log.warning(
-            "%s: far from what the voyages have in common, about which all sizes are linear. The "
-            "sizes of these voyages may be wrong by more than their intervals: follow voyages that "
-            "are alike by themselves (--voyages).", listed(list(far)),
-        )  # fmt: skip
+            "%s: far from where the likelihood is linear. The sizes of these voyages may be wrong "
+            "by more than their intervals: follow voyages that are alike by themselves "
+            "(--voyages).",
+            listed([trial.record.names[v] for v in voyages]),
+        )
 
 
-def of_courses(
-    trial: Trial, named: Sequence[Named], courses: Mapping[str, Course],
-    starts: Mapping[str, datetime],
-) -> dict[str, tuple[OfVoyage, ...]]:  # fmt: skip
+def of_verdict(
+    trial: Trial, fit: Fit, named: Sequence[Named], starts: Mapping[str, datetime]
+) -> dict[str, tuple[OfVoyage, ...]]:
     """Label → each named cause of a verdict in each voyage; none of one voyage alone, of very many,
-    of which `shiplog trend` has them, or of voyages that are FAR from each other."""
-    found: dict[str, tuple[OfVoyage, ...]] = {}
-    if not 2 <= len(trial.record.names) <= MOST_VOYAGES:
-        return found
-    for one in named:
-        course = courses.get(one.cause.label)
-        if course is None or course.information is None:
-            continue
-        with contextlib.suppress(np.linalg.LinAlgError):  # of a model that hardly is this ship's
-            season = _Season.of(trial, course.information, one.cause, starts)
-            if not season.far:
-                found[one.cause.label] = season.voyages()
-    return found
+    or of voyages that are far from each other: `shiplog trend` has those."""
+    labels = [one.cause.label for one in named if one.cause.label in fit.included]
+    if not labels or not 2 <= len(trial.record.names) <= MOST_VOYAGES:
+        return {}
+    with contextlib.suppress(np.linalg.LinAlgError):  # of a model that hardly is this ship's
+        there = own_numbers.common(trial, fit, labels)
+        information = own_numbers.information_of(trial, fit, labels, there)
+        if not there.far(information).any():
+            seasons = _together(trial, information, labels, starts)
+            return {of.cause.label: of.voyages() for of in seasons}
+    return {}
+
+
+def _together(
+    trial: Trial, information: Stretches, labels: Sequence[str], starts: Mapping[str, datetime],
+    events: Sequence[datetime] = (),
+) -> tuple[_Season, ...]:  # fmt: skip
+    """The causes of some information, their numbers one after another."""
+    by = {c.label: c for c in trial.reference.model.causes}
+    causes = [by[label] for label in labels]
+    each = tuple(cause.count for cause in causes)
+    of, names = voyage_sizes.by_voyage(trial, information, starts, events, each)
+    dated = set(trial.record.names) <= set(starts)
+    wears = [cause.kind == WEARS and dated for cause in causes]
+    first = min(starts[n] for n in trial.record.names) if dated else None
+    return tuple(
+        _Season(trial, cause, information.unit[at], of, names, pooled, first,
+                tuple(sorted(events)) if dated else ())
+        for cause, at, pooled in zip(
+            causes, of.places, pooling.pool(of, wears, trial.reference.freedom), strict=True
+        )
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -172,26 +186,6 @@ class _Season:
     pooled: Pooled
     first: datetime | None
     events: tuple[datetime, ...]
-
-    @classmethod
-    def of(
-        cls, trial: Trial, information: Stretches, cause: Cause, starts: Mapping[str, datetime],
-        events: Sequence[datetime] = (),
-    ) -> _Season:  # fmt: skip
-        likelihood, names = voyage_sizes.by_voyage(trial, information, starts, events)
-        dated = set(trial.record.names) <= set(starts)
-        wears = cause.kind == WEARS and dated
-        pooled = pooling.pool(likelihood, wears, trial.reference.freedom)
-        first = min(starts[n] for n in trial.record.names) if dated else None
-        return cls(trial, cause, information.unit, likelihood, names, pooled, first,
-                   tuple(sorted(events)) if dated else ())  # fmt: skip
-
-    @property
-    def far(self) -> tuple[str, ...]:
-        """Voyages with |x̄_v - x̄| > FAR sd(x_v), x [draws, V, q] their sizes."""
-        mean, spread = self.pooled.sizes.mean(0), self.pooled.sizes.std(0)
-        apart = (np.abs(mean - mean.mean(0)) > FAR * spread).any(-1)
-        return tuple(name for name, one in zip(self.names, apart, strict=True) if one)
 
     def voyages(self) -> tuple[OfVoyage, ...]:
         """The cause in each of them."""
@@ -356,28 +350,3 @@ def calm_speeds(trial: Trial, cause: Cause, numbers: np.ndarray) -> np.ndarray:
 def _summary(draws: np.ndarray, unit: str) -> ParameterEstimate:
     low, high = np.quantile(draws, TAIL)
     return ParameterEstimate(float(draws.mean()), float(low), float(high), unit)
-
-
-def parse_date(text: str) -> datetime:
-    """An ISO 8601 date, UTC unless it says otherwise. Raises UsageError."""
-    try:
-        found = datetime.fromisoformat(text)
-    except ValueError:
-        raise UsageError(
-            f"{text!r} is no date.", hint="give it as 2026-05-17, or 2026-05-17T08:00."
-        ) from None
-    return found if found.tzinfo else found.replace(tzinfo=UTC)
-
-
-def parse_limit(text: str) -> tuple[str, float]:
-    """`thrust_loss=0.9` as cause and value. Raises UsageError."""
-    label, _, value = text.partition("=")
-    try:
-        number = float(value)
-    except ValueError:
-        number = math.nan
-    if not label or not math.isfinite(number):
-        raise UsageError(
-            f"{text!r} is no limit.", hint="give a cause and a number, such as thrust_loss=0.9."
-        )
-    return label, number

@@ -18,11 +18,13 @@ def by_voyage(
     information: Stretches,
     starts: Mapping[str, datetime],
     events: Sequence[datetime] = (),
+    each: tuple[int, ...] = (),
 ) -> tuple[Voyages, tuple[str, ...]]:
     """y and M of (17) added over each voyage's stretches, and the voyages' names; those without a
     segment are left out.
 
     events   at which a level ends and another one begins
+    each     how many numbers each cause has, where the information is of several
     """
     record = trial.record
     voyage = record.voyage[trial.rows[information.first]]
@@ -37,7 +39,7 @@ def by_voyage(
         at = np.sort([(one.timestamp() - first) / drift.DAY_S for one in events])
         level = np.searchsorted(at, days, side="right")
         level = np.unique(level, return_inverse=True)[1]  # of two events without a voyage between
-    return Voyages(y, M, days, level), tuple(record.names[v] for v in names)
+    return Voyages(y, M, days, level, each), tuple(record.names[v] for v in names)
 
 
 def middle_of(trial: Trial, voyage: int, starts: Mapping[str, datetime]) -> float:

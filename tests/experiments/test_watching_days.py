@@ -1,0 +1,39 @@
+"""Days of sailing that are watched leg by leg: what is kept of a kill, and the rates."""
+
+import json
+
+import pytest
+
+from pipelines.experiments.watching import false_alarms, rates, replayed
+
+ALARM = {"segment": 3, "suspect": "current", "nats": 9.0}
+
+
+def leg(number: int, often: int, seldom: int = 0) -> dict:
+    alarms = {"24": [ALARM] * often, "6": [ALARM] * seldom, "1": []}
+    return {"ship": "home1", "leg": number, "seconds": 43_200.0, "alarms": alarms}
+
+
+def test_a_line_that_a_kill_cut_short_is_watched_again(tmp_path):
+    out = tmp_path / "legs.jsonl"
+    assert false_alarms.done(out) == []
+    out.write_text(json.dumps(leg(1, 0)) + "\n" + json.dumps(leg(2, 1))[:40], encoding="utf-8")
+    assert [one["leg"] for one in false_alarms.done(out)] == [1]
+
+
+def test_a_rate_has_the_exact_interval_of_its_count():
+    """Garwood (1936): 90 % of a mean of which 3 were counted are 0.818 to 7.754; of 0, 2.996."""
+    assert rates.interval(3) == pytest.approx((0.818, 7.754), abs=1e-3)
+    assert rates.interval(0) == pytest.approx((0.0, 2.996), abs=1e-3)
+    lines = list(false_alarms.report([leg(1, 2, 0), leg(2, 1, 0)]))
+    assert lines[0] == "2 legs, 1.00 days"
+    assert "| 24 | 24.0 | 3 | 3.00 (0.82 to 7.75) |" in lines
+    assert "| 1 | 1.0 | 0 | 0.00 (0.00 to 3.00) |" in lines
+
+
+def test_what_a_verdict_dates_to_a_voyage_is_found_wherever_it_stands():
+    told = {"voyage": "b", "start_s": 3.0, "end_s": 9.4, "sentence": "A force of 18 N astern."}
+    intervals = [told | {"voyage": "a"}, told]
+    verdict = {"causes": [{"voyages": [{"voyage": "b"}]}], "intervals": intervals}
+    assert replayed.diagnosed(verdict, "b") == ["3 to 9 s: A force of 18 N astern."]
+    assert replayed.diagnosed(verdict, "c") == [] == replayed.diagnosed(None, "b")
