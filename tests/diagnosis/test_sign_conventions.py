@@ -201,6 +201,30 @@ def test_a_sound_trial_has_no_convention_that_explains_it():
     assert not sign_conventions.explains(found, own, own, sign_conventions._hold(cut), 1.0)
 
 
+@pytest.mark.parametrize(("diverging", "said"), [(1, False), (3, True)])
+def test_a_window_that_diverges_is_no_sign_of_a_convention(monkeypatch, diverging, said):
+    """Of five windows one diverges, and a ship that hardly steers simulates all with L of 60, where
+    the model has 10: the model's error is no unit. Where most of them diverge, it may be."""
+    nominal = SimpleNamespace(pick=None)
+
+    class Model:
+        profile = PROFILE
+
+        def losses(self, cut):
+            if cut is nominal:
+                return np.full(5, 10.0)
+            each = np.full(5, 10.0)
+            each[:diverging] = np.inf
+            return each[cut.plan["window"].to_numpy()]
+
+    cut = replace(windows(5), plan=pl.DataFrame({"window": np.arange(5)}))
+    found = sign_conventions.Tried("rudders as radians", "`unit`", 60.0, 1.0)
+    monkeypatch.setattr(sign_conventions, "try_conventions", lambda *given: found)
+    monkeypatch.setattr(sign_conventions, "_hold", lambda cut: 100.0)
+    why = sign_conventions.sufficient_convention(Model(), cut, nominal)
+    assert bool(why) == said
+
+
 @pytest.mark.parametrize("unit", ["kn", "km/h"])
 def test_of_two_units_that_err_alike_the_one_that_the_profile_states_is_said(unit):
     """km/h called knots and m/s called knots differ by 5 %: the profile says knots, or not."""

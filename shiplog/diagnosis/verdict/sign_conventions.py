@@ -119,8 +119,21 @@ def try_conventions(
 
 def _mean(simulator: ExtendedSimulator, cut: Windows) -> float:
     """mean_w min(L_w, RUNAWAY)."""
+    return float(_losses(simulator, cut).mean())
+
+
+def _losses(simulator: ExtendedSimulator, cut: Windows) -> np.ndarray:
+    """min(L_w, RUNAWAY) [N]."""
     each = np.nan_to_num(simulator.losses(cut), nan=RUNAWAY, posinf=RUNAWAY)
-    return float(np.minimum(each, RUNAWAY).mean())
+    return np.minimum(each, RUNAWAY)
+
+
+def _simulated(simulator: ExtendedSimulator, cut: Windows) -> Windows:
+    """The windows in which the model does not diverge, or all, where it does in half of them and
+    more. Two that diverge would outweigh all others, and whatever moves the ship less, such as
+    rudders in another unit, would seem to explain them."""
+    kept = _losses(simulator, cut) < RUNAWAY
+    return cut.pick(np.flatnonzero(kept)) if 2 * kept.sum() > len(kept) else cut
 
 
 def _hold(cut: Windows) -> float:
@@ -353,6 +366,7 @@ def sufficient_convention(
 ) -> str:
     """What a convention explains so well that no search for causes is needed: it leaves next to
     nothing of what the trial has more than the nominal voyages. Empty where none does."""
+    cut = _simulated(simulator, cut)
     own, level = _mean(simulator, cut), _mean(simulator, nominal)
     found = try_conventions(simulator, cut, nominal, read_as)
     if own - found.loss < thresholds.ALL_EXCESS * (own - level):
