@@ -198,8 +198,8 @@ def test_a_voyage_that_is_far_from_the_others_is_fitted_by_itself(monkeypatch, c
     at = season_fit.fitted(trial, trial.first, ("drag",))
     there = own_numbers.common(trial, at, ("drag",))
     unit = trial.reference.columns.unit[trial.reference.columns.indices["drag"]]
-    told = own_numbers.information_of(trial, at, ("drag",), there)
-    of, _ = voyage_sizes.by_voyage(trial, told, {})
+    information = own_numbers.information_of(trial, at, ("drag",), there)
+    of, _ = voyage_sizes.by_voyage(trial, information, {})
     linear = pooling.pool(of, [False])[0].alone[..., 0].mean(0) * unit[0]
     x0 = float(there.stood[0, 0] * unit[0])
     wanted = [x0 + (x + x**2 - x0 - x0**2) / (1.0 + 2.0 * x0) for x in trial.true]

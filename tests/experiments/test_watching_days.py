@@ -32,8 +32,8 @@ def test_a_rate_has_the_exact_interval_of_its_count():
 
 
 def test_what_a_verdict_dates_to_a_voyage_is_found_wherever_it_stands():
-    told = {"voyage": "b", "start_s": 3.0, "end_s": 9.4, "sentence": "A force of 18 N astern."}
-    intervals = [told | {"voyage": "a"}, told]
+    one = {"voyage": "b", "start_s": 3.0, "end_s": 9.4, "sentence": "A force of 18 N astern."}
+    intervals = [one | {"voyage": "a"}, one]
     verdict = {"causes": [{"voyages": [{"voyage": "b"}]}], "intervals": intervals}
     assert replayed.diagnosed(verdict, "b") == ["3 to 9 s: A force of 18 N astern."]
     assert replayed.diagnosed(verdict, "c") == [] == replayed.diagnosed(None, "b")

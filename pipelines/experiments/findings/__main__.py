@@ -3,6 +3,7 @@
     python -m pipelines.experiments.findings sensors     FRT-DS-ESSO --out findings
     python -m pipelines.experiments.findings published   FRT-DS-ESSO --out findings
     python -m pipelines.experiments.findings refitted    FRT-DS-ESSO --out findings
+    python -m pipelines.experiments.findings forces      FRT-DS-ESSO --out findings
     python -m pipelines.experiments.findings wind        FRT-DS-ESSO --out findings
     python -m pipelines.experiments.findings faults      FRT-DS-ESSO --out findings
     python -m pipelines.experiments.findings faults-other OTHER-SHIP --out findings
@@ -32,7 +33,7 @@ from pipelines.experiments.findings import (
 
 FINDINGS: dict[str, Callable[[Path, Path], str]] = {
     "sensors": esso_osaka.sensors, "published": esso_osaka.published,
-    "refitted": esso_osaka.refitted, "wind": esso_osaka.wind,
+    "refitted": esso_osaka.refitted, "forces": esso_osaka.forces, "wind": esso_osaka.wind,
     "faults": faults.esso_osaka, "faults-other": faults.other_ship,
     "actuators-blueboat": actuator_faults.blueboat, "actuators-kvlcc2": actuator_faults.kvlcc2,
     "milliampere": milliampere.milliampere, "kvlcc2": kvlcc2.kvlcc2,

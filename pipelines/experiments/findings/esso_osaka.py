@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import polars as pl
+
 from pipelines.experiments.esso_osaka import TWIN, trials_store
 from pipelines.experiments.extrapolation import physics
 from pipelines.experiments.findings.reported import diagnosed, variant
 from shiplog.commands.identify import identify_run
 from shiplog.commands.prepare import expand, ingest_logs
 from shiplog.report.evaluation import tables
+from shiplog.training.runs import load_model
 from shiplog.training.settings.run_config import Config
 from shiplog.voyages.sensors import sensor_consistency
 from shiplog.voyages.sensors.sensor_consistency import Estimate
 from shiplog.voyages.store.store import Store
 from shiplog.voyages.windows.split_settings import Split
 
+AXES = ("surge", "sway", "yaw")
 MANOEUVRES = ("berthing", "random", "turn", "zigzag")
 COLUMNS = {  # kind and channel of an estimate → its column
     ("clock_offset", "yaw_rate"): "yaw rate late, s",
@@ -84,6 +88,27 @@ def refitted(folder: Path, out: Path) -> str:
     store = trials_store(folder, out)
     run = physics(store, out / "refitted", split(store))
     return diagnosed(run, store, trials(store, "random_*"), out / "refitted-random", "random")
+
+
+def forces(folder: Path, out: Path) -> str:
+    """Forces of the identified MMG over those of the published one, at the measured motion: least
+    squares through zero, Σ F F'/Σ F², of each part and axis over all rows."""
+    store = trials_store(folder, out)
+    found = {}
+    for name, fit in (("published", False), ("refitted", True)):
+        run = load_model.load(physics(store, out / name, split(store), fit=fit))
+        seconds = store.seconds(trials(store), store.profile(trials(store)))
+        found[name] = run.forces(seconds)
+    both = found["published"].join(
+        found["refitted"], on=("voyage", "time", "part"), suffix="_refitted"
+    )
+    ratio = {
+        axis: (pl.col(axis) * pl.col(f"{axis}_refitted")).sum() / (pl.col(axis) ** 2).sum()
+        for axis in AXES
+    }
+    rows = both.group_by("part", maintain_order=True).agg(**ratio).rows()
+    cells = [(part, *(f"{value:.2f}" for value in values)) for part, *values in rows]
+    return tables.table(("part", *AXES), cells)
 
 
 def split(store: Store) -> Split:

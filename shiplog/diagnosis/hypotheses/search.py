@@ -332,8 +332,8 @@ def additions(
     )  # fmt: skip
     promised = {f.name: f.evidence for f in found if f.evidence > 0.0}
     if nearer and max(promised.values(), default=0.0) < CLOSE_CALL:
-        of = {f.name: f.numbers for f in found}
-        promised = {name: _from_nearer(table, fit, of[name]) for name in promised}
+        of, here = {f.name: f.numbers for f in found}, _value(table, fit.point, fit)
+        promised = {name: _from_nearer(table, fit, of[name]) - here for name in promised}
     most, scale, added = max(promised.values(), default=0.0), table.scale, []
     for f in sorted(found, key=lambda f: -promised.get(f.name, -math.inf)):
         gained = promised.get(f.name, 0.0)
@@ -346,18 +346,27 @@ def additions(
 
 
 def _from_nearer(table: Hypotheses, fit: Fit, added: Mapping[str, np.ndarray]) -> float:
-    """Log Bayes factor [nats] of a cause in addition to a fit, with the trial linearised at its
+    """Log evidence [nats] of a fit and a cause in addition, with the trial linearised at both their
     numbers, at the fit's own noise; minus infinity where the model diverges there."""
-    trial, own = table.trial, fit.estimate
-    numbers = {**own.numbers, **added}
+    numbers = {**fit.estimate.numbers, **added}
     try:
-        point = trial.linearise(numbers, fit.point, own.noise_factor, fit.remainder)
+        point = table.trial.linearise(
+            numbers, fit.point, fit.estimate.noise_factor, fit.remainder
+        )  # fmt: skip
     except np.linalg.LinAlgError:
         return -math.inf
-    noise, remainder = own.noise_factor, fit.remainder
-    there = evidence.level(trial, point, noise, tuple(numbers), remainder)
-    here = evidence.level(trial, fit.point, noise, fit.included, remainder)
-    return there.value - here.value
+    return _value(table, point, fit, tuple(numbers))
+
+
+def _value(
+    table: Hypotheses, point: Point, fit: Fit, included: tuple[str, ...] | None = None
+) -> float:
+    """Log evidence [nats] at a point, with the noise and the remainder of a fit; of its causes,
+    unless others are `included`."""
+    causes = fit.included if included is None else included
+    return evidence.level(
+        table.trial, point, fit.estimate.noise_factor, causes, fit.remainder
+    ).value  # fmt: skip
 
 
 def reductions(one: Hypothesis) -> list[tuple[tuple[str, ...], dict[str, np.ndarray]]]:

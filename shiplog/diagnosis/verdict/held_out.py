@@ -22,7 +22,7 @@ from shiplog.diagnosis.verdict.network_base import Own
 from shiplog.diagnosis.verdict.result import Decision, Named
 from shiplog.models.causes import constants_of
 from shiplog.ship_profile.profile import Profile
-from shiplog.simulation.error_reduction import RUNAWAY, Gain, diverged, gain, parts
+from shiplog.simulation.error_reduction import Gain, diverged, gain, parts
 from shiplog.simulation.extended_simulator import ExtendedSimulator
 from shiplog.voyages.windows.windows import Windows
 
@@ -206,11 +206,12 @@ class HeldOut(Rollouts):
 
     @cached_property
     def _level(self) -> float | None:
-        """Mean L of the nominal windows; None without any."""
+        """Mean L of the nominal windows that the model simulates; None without any."""
         if self.nominal is None:
             return None
-        each = self.before.losses(self.nominal)
-        return float(np.minimum(np.nan_to_num(each, nan=RUNAWAY, posinf=RUNAWAY), RUNAWAY).mean())
+        return sign_conventions.mean(
+            self.before, sign_conventions.simulated(self.before, self.nominal)
+        )
 
     def _constants(self, decision: Decision) -> dict[str, np.ndarray]:
         return constants_of((n.cause for n in decision.named), self.trial.reference.setting)

@@ -98,26 +98,26 @@ def try_conventions(
     still = _hold(cut)
     found, handicap = [], {INSTEAD: NEARLY}
     for one in conventions(simulator.profile, cut, read_as):
-        loss = _mean(simulator, one.windows) * max(still / max(_hold(one.windows), 1e-12), 1.0)
+        loss = mean(simulator, one.windows) * max(still / max(_hold(one.windows), 1e-12), 1.0)
         found.append(Tried(one.words, one.key, loss))
         if not one.stated:
             handicap[one.words] = UNSTATED
     found.sort(key=lambda one: one.loss * handicap.get(one.words, 1.0))
     if nominal is None:
         return found[0]
-    before, there = _mean(simulator, nominal), {}
+    before, there = mean(simulator, nominal), {}
     for one in found:
         if not there:
             there = {t.words: t.windows for t in conventions(simulator.profile, nominal)}
         share = math.inf  # of a convention that the nominal windows cannot be read under
         if one.words in there:
-            share = _mean(simulator, there[one.words]) / max(before, 1e-12)
+            share = mean(simulator, there[one.words]) / max(before, 1e-12)
         if share > THERE_TOO:
             return replace(one, there=share)
     return replace(found[0], loss=RUNAWAY)
 
 
-def _mean(simulator: ExtendedSimulator, cut: Windows) -> float:
+def mean(simulator: ExtendedSimulator, cut: Windows) -> float:
     """mean_w min(L_w, RUNAWAY)."""
     return float(_losses(simulator, cut).mean())
 
@@ -128,12 +128,14 @@ def _losses(simulator: ExtendedSimulator, cut: Windows) -> np.ndarray:
     return np.minimum(each, RUNAWAY)
 
 
-def _simulated(simulator: ExtendedSimulator, cut: Windows) -> Windows:
+def simulated(simulator: ExtendedSimulator, cut: Windows) -> Windows:
     """The windows in which the model does not diverge, or all, where it does in half of them and
     more. Two that diverge would outweigh all others, and whatever moves the ship less, such as
     rudders in another unit, would seem to explain them."""
     kept = _losses(simulator, cut) < RUNAWAY
-    return cut.pick(np.flatnonzero(kept)) if 2 * kept.sum() > len(kept) else cut
+    if kept.all() or 2 * kept.sum() <= len(kept):
+        return cut
+    return cut.pick(np.flatnonzero(kept))
 
 
 def _hold(cut: Windows) -> float:
@@ -366,8 +368,8 @@ def sufficient_convention(
 ) -> str:
     """What a convention explains so well that no search for causes is needed: it leaves next to
     nothing of what the trial has more than the nominal voyages. Empty where none does."""
-    cut = _simulated(simulator, cut)
-    own, level = _mean(simulator, cut), _mean(simulator, nominal)
+    cut, nominal = simulated(simulator, cut), simulated(simulator, nominal)
+    own, level = mean(simulator, cut), mean(simulator, nominal)
     found = try_conventions(simulator, cut, nominal, read_as)
     if own - found.loss < thresholds.ALL_EXCESS * (own - level):
         return ""
