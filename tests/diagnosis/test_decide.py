@@ -346,3 +346,35 @@ def test_why_a_special_case_is_not_named_is_not_said_by_itself(trial, monkeypatc
     monkeypatch.setattr(straight.One, "special", special)
     found = verdict(trial, {(DRAG, NOMINAL): 0.95, ((), NOMINAL): 0.05})
     assert {"clock:wind", "load", "two"} == set(found.rejected)
+
+
+@pytest.mark.parametrize(("place", "orders", "device"), [(-1.4, 0, False), (1.0, 0, True),
+                                                         (-1.4, 2, True)])  # fmt: skip
+def test_a_force_at_the_place_of_a_unit_that_is_named_is_that_unit(
+    trial, monkeypatch, place, orders, device
+):
+    """The port rudder is 1.5 m astern of midship. A force there, next to a cause in it, is what the
+    cause's equations leave; a force at the bow is another thruster's. The propeller, unit 2, does
+    not push athwart."""
+    monkeypatch.setattr(straight.One, "orders", lambda cause, profile: frozenset({orders}))
+    force = replace(SIDE_THRUST, lever=place, device=1.0)
+    found = verdict(
+        trial, {(DRAG, INTERMITTENT): 1.0, ((), INTERMITTENT): 1e-9}, side_force=force,
+        evidence={(DRAG, INTERMITTENT): 400.0, ((), INTERMITTENT): 300.0},
+    )  # fmt: skip
+    assert (found.verdict, named(found)) == ("named", ["drag"])
+    assert (found.side_force is not None) == device
+
+
+@pytest.mark.parametrize(("size", "word"), [(0.001, "none"), (0.5, "named")])
+def test_a_remainder_that_is_there_only_next_to_traces_is_none(trial, size, word):
+    """By itself the change in time is less probable than nothing. Next to a drag that does not
+    matter it is an error of the drag's equations."""
+    given = {(DRAG, "time"): 1.0, (DRAG, NOMINAL): 1e-3, ((), NOMINAL): 1e-4, ((), "time"): 1e-6}
+    evidence = {(DRAG, "time"): 90.0, (DRAG, NOMINAL): 85.0, ((), "time"): 1.0}
+    found = verdict(trial, given, sizes={"drag": size}, spread=1e-4, evidence=evidence)
+    assert found.verdict == word
+    # where the change is more probable than nothing by itself, too, it is stated
+    given[(), "time"] = 1e-3
+    found = verdict(trial, given, sizes={"drag": 0.001}, spread=1e-4, evidence=evidence)
+    assert (found.verdict, found.structure.family) == ("unknown", "time")

@@ -361,3 +361,28 @@ def test_what_takes_most_off_the_error_comes_first(trial, first):
     decision, _, _, _ = judge(made, HeldOut({("drag", "load"): BETTER}, worths))
     assert decision.named[0].cause.label == first
     assert {one.cause.label for one in decision.named} == {"drag", "load"}
+
+
+@pytest.mark.parametrize(
+    ("drag", "own", "names"),
+    [(100.0, UNSURE, ["load"]), (100.0, BETTER, ["drag", "load"]),
+     (600.0, UNSURE, ["drag", "load"])],
+)  # fmt: skip
+def test_a_large_cause_makes_no_remainder_slight_for_a_small_one(trial, drag, own, names):
+    """The remainder adds 10 nats. That is slight next to both together; next to the 100 of the drag
+    it is not, so that the drag has to gain by itself. Next to 600 it is an error of equations."""
+    both = ("drag", "load")
+    load, whole = 900.0, 900.0 + drag
+    made = weighed.search(
+        trial,
+        {(both, RAISED): 0.99, (both, NOMINAL): 0.01, (LOAD, RAISED): 1e-6, (LOAD, NOMINAL): 1e-8,
+         (DRAG, NOMINAL): 1e-9},
+        evidence={
+            (both, RAISED): whole + 10.0, (both, NOMINAL): whole, (LOAD, RAISED): load + 10.0,
+            (LOAD, NOMINAL): load, (DRAG, NOMINAL): drag,
+        },
+    )  # fmt: skip
+    held = HeldOut({both: BETTER, LOAD: BETTER}, {"drag": own, "load": BETTER})
+    decision, _, _, refuted = judge(made, held)
+    assert sorted(one.cause.label for one in decision.named) == names
+    assert ("drag" in refuted) == ("drag" not in names)

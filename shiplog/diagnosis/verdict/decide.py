@@ -63,7 +63,7 @@ def decide(
     stated_kind = found.remainder
     best = posteriors.best_with(found, names, stated_kind if not names else None)
     fit = table.fit(best)
-    p_device = posteriors.device(best, table.parts.pattern)
+    p_device = posteriors.device(table, best)
     kind = posteriors.practical_kind(table, best)
     is_device = p_device >= thresholds.STATED  # then what remains has a name, too
     in_doubt = _imitated(table, best, fit, names)

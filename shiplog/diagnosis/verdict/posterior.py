@@ -27,6 +27,10 @@ from shiplog.models.causes.base import deviations
 STOCHASTIC = "stochastic"  # the contract's word for raised process noise
 FAMILY = {RAISED: STOCHASTIC}
 DRAWS = 400  # of a cause's numbers; a probability of 0.9 is then known to 0.015
+# Ship lengths, within which a force and a recorded unit are at one place: side thrusters of a ship
+# are further from each other, and a force's place is known to some hundredths.
+SAME_PLACE = 0.1
+ATHWART = 0.5  # of a fixed thruster's force: its part to the side, from which on it pushes athwart
 CERTAIN_NATS = 300.0  # of a cause that was only scanned: more decides no more, and overflows
 
 
@@ -190,10 +194,16 @@ def _deviations(covariance: np.ndarray) -> np.ndarray:
 
 
 def practical_kind(table: Hypotheses, one: Hypothesis) -> str:
-    """Its kind of remainder; process noise as on an ordinary day is nominal. So is a force at one
-    place that varies as noise does and is no larger: gusts act at one place, and increase with the
-    wind. Noise that no ordinary day has is raised, under whatever prior it was weighed."""
-    if one.kind not in (NOMINAL, RAISED, INTERMITTENT) or device(one, table.parts.pattern):
+    """Its kind of remainder; nominal where that is nothing to act on.
+
+    Process noise as on an ordinary day is nominal. So is a force at one place that varies as noise
+    does and is no larger: gusts act at one place, and increase with the wind. Noise that no
+    ordinary day has is raised, under whatever prior it was weighed. A force at the place of a unit
+    that one of the causes is in is what that cause's equations leave. So is a change of a family
+    that is probable only next to causes of no practical size."""
+    if one.kind in table.trial.families:
+        return NOMINAL if _beside_traces(table, one) else one.kind
+    if one.kind not in (NOMINAL, RAISED, INTERMITTENT) or device(table, one):
         return one.kind
     acceleration = table.trial.reference.process_noise.acceleration
     factor = one.remainder.factor_with_force(one.estimate.noise_factor, acceleration)
@@ -201,18 +211,44 @@ def practical_kind(table: Hypotheses, one: Hypothesis) -> str:
     if table.parts.ordinary_spreads:
         spread = thresholds.ORDINARY_SPREADS * table.trial.nominal_spread
         ordinary = max(ordinary, math.exp(spread))
-    if factor < ordinary:
+    if factor < ordinary or (one.kind == INTERMITTENT and _at_a_unit_of_a_cause(table, one)):
         return NOMINAL
     return RAISED if one.kind == NOMINAL else one.kind
 
 
-def device(one: Hypothesis, by_pattern: bool = True) -> float:
-    """Probability that what remains is an intermittent force, and that of one device: by its
-    pattern, or else whether a course that is on or off is more probable."""
+def _beside_traces(table: Hypotheses, one: Hypothesis) -> bool:
+    """Whether a change of a family is less probable than none, next to those causes alone of the
+    hypothesis that are more likely than not of practical size."""
+    large = practical(table, one)
+    matter = tuple(n for n in one.causes if large.get(n, 1.0) >= 0.5)
+    if matter == one.causes:
+        return False
+    with_change, without = (table.found.get((matter, kind)) for kind in (one.kind, NOMINAL))
+    return with_change is not None and without is not None and with_change.score < without.score
+
+
+def device(table: Hypotheses, one: Hypothesis) -> float:
+    """Probability that what remains is an intermittent force, and that of one device which is not
+    recorded: by its pattern, or else whether a course that is on or off is more probable."""
     force = one.side_force
-    if one.kind != INTERMITTENT or force is None:
+    if one.kind != INTERMITTENT or force is None or _at_a_unit_of_a_cause(table, one):
         return 0.0
-    return force.device if by_pattern else float(force.course is not None)
+    return force.device if table.parts.pattern else float(force.course is not None)
+
+
+def _at_a_unit_of_a_cause(table: Hypotheses, one: Hypothesis) -> bool:
+    """Whether the intermittent force of a hypothesis acts at the place of a recorded unit that can
+    push athwart, and that one of its causes is in: two names for one fault."""
+    if one.side_force is None:
+        return False
+    profile = table.trial.record.profile
+    units = {i for n in one.causes if n in table.by for i in table.by[n].orders(profile) or ()}
+    near = SAME_PLACE * profile.ship.length_m
+    return any(
+        abs(a.position_m[0] - one.side_force.lever) < near
+        for a in (profile.actuators[i] for i in units)
+        if a.kind in ("rudder", "azimuth") or abs(math.sin(math.radians(a.direction_deg))) > ATHWART
+    )
 
 
 def share_of_causes(table: Hypotheses, one: Hypothesis, causes: Sequence[str]) -> float:

@@ -14,7 +14,9 @@ With a remainder the noise is not that of the likelihood, and a log Bayes factor
 are then named only if the interval of their joint gain lies above zero, and if they take away MOST
 of the held-out error beyond that of the nominal voyages. Otherwise the remainder is the larger part
 of the answer, and they are candidates. A remainder so slight that it can be an error of the causes'
-own equations puts none in doubt.
+own equations puts none in doubt. One cause of several may explain far more than the others do, so
+that a remainder is slight next to it alone: each of the others has to have a significant gain of
+its own.
 
 Nor is a log Bayes factor a proof of causes that take the place of a refuted one, which was more
 probable. Their joint gain has to be significant, too. Next to other named causes, so has the own
@@ -149,6 +151,31 @@ def _unproved(
     )
 
 
+def _unsure_beside_remainder(
+    search: Search, found: Posterior, decision: Decision, asked: Sequence[tuple[Named, Gain]],
+    judges: Callable[[Named], bool],
+) -> tuple[frozenset[str], str] | None:  # fmt: skip
+    """Of several causes the one that gains least of those that a stated remainder is not slight
+    next to, that the windows can judge, and whose own gain is not significant; and why."""
+    if len(asked) == 1 or decision.side_force is not None:
+        return None
+    table, best = search.table, posteriors.best_with(found, [n.cause.name for n, _ in asked])
+    if 1.0 - found.kinds.get(NOMINAL, 0.0) < thresholds.STATED:
+        return None
+    unsure = [
+        (one, gain) for one, gain in asked
+        if not gain.real and judges(one) and not posteriors.slight(table, best, one.cause.name)
+    ]  # fmt: skip
+    if not unsure:
+        return None
+    one, worth = min(unsure, key=lambda pair: pair[1].low)
+    return frozenset((one.cause.name,)), (
+        "the catalogue does not explain all of the trial, so each of several causes is named only "
+        "if it significantly reduces the held-out error by itself: here by "
+        f"{worth.low:.1%} to {worth.high:.1%}"
+    )
+
+
 def judge(
     search: Search, held: Judge | None
 ) -> tuple[Decision, Posterior, Gain | None, dict[str, str]]:
@@ -178,7 +205,11 @@ def judge(
             worths = [held.worth(rest, decision) for rest in reduced]
         asked = list(zip(decision.named, worths, strict=True))
         judges = partial(_judges, held, decision)
-        if refutable := _refuted(asked, judges) or _unproved(asked, first):
+        if refutable := (
+            _refuted(asked, judges)
+            or _unproved(asked, first)
+            or _unsure_beside_remainder(search, found, decision, asked, judges)
+        ):
             names, why = refutable
             bans[names] = why
             search.exclude(*names)
