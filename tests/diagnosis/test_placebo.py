@@ -14,6 +14,12 @@ from shiplog.diagnosis.nominal.placebo import placebos
 SHARE = 0.5
 
 
+class Held(straight.One):
+    """A cause of which the nominal campaign has no number of its own."""
+
+    nominal = False
+
+
 def campaign(changed: float, part: int = 2, sensitivity: float = 0.6):
     """Four parts of three segments; one of them has `drag`, in its realistic size of 0.5."""
     columns = straight.columns_of(CAUSES)
@@ -71,6 +77,24 @@ def test_a_placebo_is_the_difference_of_two_evidences(name, sizes):
             value = marginal(SHARE * gram[np.ix_(both, both)], known, towards)
             best = max(best, value - plain)
     assert placebos(made)[name] == pytest.approx(best, abs=1e-6)
+
+
+def test_what_all_voyages_have_alike_counts_together():
+    """A drag that no number of the nominal campaign stands for, on each of its four parts. The log
+    Bayes factor of one number for all of a large effect goes with the square of what is seen of it:
+    about four times that of the most telling part, and at least the sum without it."""
+    held = tuple(Held(c.word) if c.label == "drag" else c for c in CAUSES)
+    columns = straight.columns_of(held)
+    record = straight.sailed(12)
+    given = straight.passed(record, columns, sensitivity=0.6)
+    at = columns.indices["drag"]
+    given.e[:] += given.j[..., at] @ np.full(len(at), 2.0)
+    made = straight.campaign(record, given, columns, share=SHARE, deviation=0.0, size=0.1)
+    parts = [placebos(replace(made, each=(g,), rows=(r,), voyage=np.zeros(1, int)))["drag"]
+             for g, r in zip(made.each, made.rows, strict=True)]  # fmt: skip
+    assert min(parts) > 3.0
+    assert placebos(made)["drag"] == pytest.approx(sum(parts), rel=0.25)
+    assert placebos(made)["drag"] > 2.0 * max(parts)
 
 
 def test_a_campaign_of_no_parts_has_no_placebo():

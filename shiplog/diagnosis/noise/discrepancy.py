@@ -223,18 +223,21 @@ def _motion_products(profile: Profile, nodes: Nodes) -> list[np.ndarray]:
 
 
 def _control_products(profile: Profile, nodes: Nodes) -> list[np.ndarray]:
-    """n|n| and |n|u of every unit that drives, n in rev/s; of every angle δ
+    """n|n|, |n|u and n³ of every unit that drives, n in rev/s; of every angle δ
 
         sin δ u|u|,  1 - cos δ,  n|n| sin δ,  n|n| (1 - cos δ)   of each unit of `driving_units`,
+        n³ sin δ,  n³ (1 - cos δ)                                where it turns that unit's thrust,
         sin(πδ/δ_max) u|u|,  sin(πδ/δ_max) n|n|                  of a rudder,
 
-    whose force need not grow with its angle (stall, play, a stop)."""
+    whose force need not grow with its angle (stall, play, a stop). Nor need thrust grow with the
+    square of the order: n³ bends its curve at small orders against large ones, which a limit or a
+    dead band would do, too."""
     u = nodes.state[..., [1]]
     driving = [i for i, a in enumerate(profile.actuators) if a.kind in ("propeller", "thruster")]
     found = []
     for i in driving:
         n = nodes.driven[..., [i]]
-        found += [n * np.abs(n), np.abs(n) * u]
+        found += [n * np.abs(n), np.abs(n) * u, n**3]
     for i, actuator in enumerate(profile.actuators):
         if actuator.kind not in ("rudder", "azimuth"):
             continue
@@ -246,6 +249,9 @@ def _control_products(profile: Profile, nodes: Nodes) -> list[np.ndarray]:
         for j in driving_units(profile, i, driving):
             thrust = nodes.driven[..., [j]] * np.abs(nodes.driven[..., [j]])
             found += [thrust * np.sin(angle), thrust * (1.0 - np.cos(angle))]
+            if actuator.kind == "azimuth":
+                cubic = nodes.driven[..., [j]] ** 3
+                found += [cubic * np.sin(angle), cubic * (1.0 - np.cos(angle))]
             found += [thrust * shape for shape in bent]
         found += [shape * u * np.abs(u) for shape in bent]
     return found

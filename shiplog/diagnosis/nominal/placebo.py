@@ -7,6 +7,9 @@ the nominal ones have
 
     A = M_aa - M_a (M + Λ)⁻¹ M_aᵀ,   t = g_a - M_a (M + Λ)⁻¹ (g + η)
     log Bayes factor = ½ s² tᵀ (s² A + I)⁻¹ t - ½ log|s² A + I|
+
+A misfit that all voyages have alike is hardly seen in one of them, and a trial is several. Of all
+voyages together, with one number for them, A and t are the sums of each one's.
 """
 
 from __future__ import annotations
@@ -20,8 +23,9 @@ from shiplog.diagnosis.nominal.nominal_campaign import Campaign
 
 
 def placebos(campaign: Campaign) -> Mapping[str, float]:
-    """Label or family → max over nominal voyages and sizes s of its log Bayes factor ½ s² tᵀ (s² A
-    + I)⁻¹ t - ½ log|s² A + I|, at least 0, in nats. A voyage counts as much of itself as a trial.
+    """Label or family → max over nominal voyages, and all of them together, and over sizes s of its
+    log Bayes factor ½ s² tᵀ (s² A + I)⁻¹ t - ½ log|s² A + I|, at least 0, in nats. A voyage counts
+    as much of itself as a trial.
     """
     columns, share = campaign.reference.columns, campaign.reference.counts
     tested: dict[str, tuple[np.ndarray, tuple[float, ...]]]
@@ -29,6 +33,8 @@ def placebos(campaign: Campaign) -> Mapping[str, float]:
     for family in (*campaign.discrepancy.families, *campaign.omitted.families):
         tested[family.name] = (family.columns, CHANGE_SIZES)
     most = dict.fromkeys(tested, 0.0)
+    together = {name: (np.zeros((len(at),) * 2), np.zeros(len(at)))
+                for name, (at, _) in tested.items()}  # fmt: skip
     for left_out, gram in enumerate(campaign.voyages):
         information, pull = campaign.prior_without(left_out)
         count = len(pull)
@@ -40,8 +46,11 @@ def placebos(campaign: Campaign) -> Mapping[str, float]:
             M_xa = gram[1 : 1 + count, 1 + at]
             t = gram[1 + at, 0] - M_xa.T @ x
             A = gram[np.ix_(1 + at, 1 + at)] - M_xa.T @ V @ M_xa
-            nats = max(_log_bayes_factor(A, t, size) for size in sizes)
-            most[name] = max(most[name], nats)
+            most[name] = max(most[name], *(_log_bayes_factor(A, t, size) for size in sizes))
+            together[name][0][:] += A
+            together[name][1][:] += t
+    for name, (A, t) in together.items():
+        most[name] = max(most[name], *(_log_bayes_factor(A, t, s) for s in tested[name][1]))
     return most
 
 

@@ -1,14 +1,15 @@
 """Held-out voyages may refute a cause, or leave it in doubt: two rules for all causes.
 
 The numbers of a hypothesis are fitted without each fold in turn. A cause is refuted if the 90 %
-interval of its gain on held-out windows lies below zero. The search then goes on without it, and
-probabilities are those of the hypotheses that do not contain it. Its gain is that over the other
-names, whose numbers are fitted again. If one of them is an alias in the catalogue
-(`separated_by`), either may do the work of both: only the two together are refuted. The windows
-compare velocities. What does not itself change them, as the clock of the position, they cannot
-refute: the loss is that of other numbers. Nor do they refute a force or a property of the ship next
-to an unrecorded thruster. They lack its force; the helm answers it, and a rudder that is too weak
-would make up for it. The likelihood has the force in its noise.
+interval of its gain on held-out windows lies below zero, of the error of all of them or of the
+typical window's: most of the error may be in a few windows, of which no other is like. The search
+then goes on without it, and probabilities are those of the hypotheses that do not contain it. Its
+gain is that over the other names, whose numbers are fitted again. If one of them is an alias in the
+catalogue (`separated_by`), either may do the work of both: only the two together are refuted. The
+windows compare velocities. What does not itself change them, as the clock of the position, they
+cannot refute: the loss is that of other numbers. Nor do they refute a force or a property of the
+ship next to an unrecorded thruster. They lack its force; the helm answers it, and a rudder that is
+too weak would make up for it. The likelihood has the force in its noise.
 
 With a remainder the noise is not that of the likelihood, and a log Bayes factor is no proof. Causes
 are then named only if the interval of their joint gain lies above zero, and if they take away MOST
@@ -121,11 +122,11 @@ def _refuted(
 ) -> tuple[frozenset[str], str] | None:
     """Of causes whose whole interval is a loss, and that the windows can judge, the one whose loss
     is most certain, and why; together with another one from which it is hard to separate."""
-    worse = [pair for pair in asked if pair[1].high < 0.0 and judges(pair[0])]
+    worse = [(one, lost) for one, gain in asked if (lost := gain.worse) and judges(one)]
     if not worse:
         return None
-    one, worth = min(worse, key=lambda pair: pair[1].high)
-    loss = f"the error is {-worth.high:.1%} to {-worth.low:.1%} greater"
+    one, (low, high) = min(worse, key=lambda pair: pair[1][1])
+    loss = f"the error is {-high:.1%} to {-low:.1%} greater"
     name = one.cause.name
     for other in (n.cause for n, _ in asked if n.cause.name != one.cause.name):
         if other.name in one.cause.separated_by or name in other.separated_by:

@@ -47,9 +47,6 @@ class OnUnits(Cause):
     kind = "ship"
     form_error = SHARPNESS
     kinds: ClassVar[tuple[str, ...]] = (*TURNING, *PUSHING)
-    # Whether it bends the curve of force over order: less at large, or at small orders.
-    # No law has that curve exactly, and what the nominal voyages have of it is no change.
-    bends_force: ClassVar[bool] = False
     still = "no actuator's order moves in these voyages"
 
     @property
@@ -62,9 +59,7 @@ class OnUnits(Cause):
 
     @property
     def nominal(self) -> bool:
-        """Of a single unit's curve of force over order; of other causes, what the nominal voyages
-        have the coefficients have. Units together are an alias of the single ones."""
-        return self.bends_force and len(self.units) == 1
+        return False  # what of it the nominal voyages have, coefficients and discrepancy have
 
     def compatible(self, label: str) -> bool:
         """With another one of its name where both are of single units."""
@@ -137,7 +132,6 @@ class ActuatorLimit(OnUnits):
     stops at 12, or an engine that its protection slows down to dead slow."""
 
     name = "actuator_limit"
-    bends_force = True
     kinds = ("rudder", *PUSHING)
     story = "An actuator goes no farther than a limit."
     equation = "u = min(max(u_recorded, -{limit:.3g}), {limit:.3g})"
@@ -231,7 +225,6 @@ class ActuatorDeadBand(OnUnits):
     50 µs of 800 in which it stands still; a steering gear's play is a degree or two of 35."""
 
     name = "actuator_dead_band"
-    bends_force = True
     story = "An actuator has a dead band."
     equation = "u = band(u_recorded), ±{half_width:.3g} wide"
     remedy = (
