@@ -44,6 +44,8 @@ class Trial:
     weight    [S] for how much a segment counts; nothing, where the model diverges on it
     first     where it was linearised first; None before that
     begun     whether it is known where the model itself diverges
+    as_nominal  whether the model simulates it as well as the nominal voyages: then no dependence
+              that the model lacks has changed
     cache     readings, products and starts, which its copies with other weights share
     """
 
@@ -59,6 +61,7 @@ class Trial:
     cache: Cache
     first: Point | None = None
     begun: bool = False
+    as_nominal: bool = False
     excluded: tuple[str, ...] = ()
 
     @classmethod
@@ -95,7 +98,9 @@ class Trial:
 
     @cached_property
     def families(self) -> dict[str, np.ndarray]:
-        """Family of the discrepancy → its columns."""
+        """Family of the discrepancy → its columns, of those that may have changed."""
+        if self.as_nominal:
+            return {}
         both = (*self.campaign.discrepancy.families, *self.omitted.families)
         return {family.name: family.columns for family in both}
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.stats import mannwhitneyu
 
 from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.hypotheses import fits
@@ -27,6 +28,7 @@ from shiplog.simulation.extended_simulator import ExtendedSimulator
 from shiplog.voyages.windows.windows import Windows
 
 Half = tuple[float, bool] | None  # s into the voyage, and whether it is the later half
+ONE_SIDE = 0.05  # probability, of one side of a 90 % interval
 ROUNDING = 1e-6  # of L: two rollouts that differ by no more are the same
 
 
@@ -198,6 +200,22 @@ class HeldOut(Rollouts):
             f"{sign_conventions.sentence(self._other, own)}: these data hardly determine which is "
             "right."
         )
+
+    @property
+    def worse_than_nominal(self) -> bool:
+        """Whether the windows' errors are greater than those of the nominal windows, by the rank
+        sums of L (Mann & Whitney 1947); so, too, without nominal windows. One window with most of
+        the error decides nothing there."""
+        if self.nominal is None:
+            return True
+        nominal = self.parts_of(self.nominal)
+        trial = self.losses_before[self.counted]
+        p = mannwhitneyu(trial.sum(1), nominal.sum(1), alternative="greater").pvalue
+        return bool(p < ONE_SIDE)
+
+    def parts_of(self, cut: Windows) -> np.ndarray:
+        """L by channel [N, 3] of other windows, by the model as it stands."""
+        return parts(self.before.states(cut, self.before.theta) - cut.state, cut.dt)
 
     @cached_property
     def _other(self) -> sign_conventions.Tried:

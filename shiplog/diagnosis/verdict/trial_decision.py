@@ -74,17 +74,21 @@ def decide_trial(
             run, nominal, recorded, causes, lacking, numbers, barred=barred, parts=parts,
             excluded=excluded,
         )  # fmt: skip
-        made = replace(made, trial=share(made.trial))
+        as_nominal = parts.level and cut is not None and not judge_of(made.trial).worse_than_nominal
+        made = replace(made, trial=share(replace(made.trial, as_nominal=as_nominal)))
         return _searched(run, made, reach, parts, numbers, nominal is None and run.given)
+
+    def judge_of(trial: Trial) -> HeldOut:
+        assert cut is not None
+        simulator = trial_voyages.simulator(run, trial)
+        return HeldOut(cut, simulator, trial, None, before, read_as)
 
     found = searched()
     if nominal is None and run.given and (numbers := found.numbers):
         del found  # its products, before those of the next one
         found = searched(numbers)
     trial = found.trial
-    judge = None
-    if cut is not None:
-        judge = HeldOut(cut, trial_voyages.simulator(run, trial), trial, None, before, read_as)
+    judge = None if cut is None else judge_of(trial)
     reach("held-out voyages")
     refutes = judge if parts.refutation else None
     decision, _, gain, refuted = refutation.judge(found.search, refutes)
