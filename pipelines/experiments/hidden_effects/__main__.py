@@ -103,7 +103,8 @@ def _short_of(found: Score, least: int) -> int:
 
 def _scores(given: argparse.Namespace) -> int:
     with archive.opened(given.out) as folders:
-        page = validation.page([score.read(folder) for folder in folders], given.markdown)
+        found = [score.read(folder) for folder in folders]
+        page = validation.page(found, given.markdown, given.machine)
     if given.markdown is None:
         print(page.text)
     else:
@@ -167,6 +168,7 @@ def _parser() -> argparse.ArgumentParser:
     page.add_argument(
         "--markdown", type=Path, metavar="PATH", help="write it there, with its picture"
     )
+    page.add_argument("--machine", default=validation.MACHINE, help="on which the cases were run")
     packed = commands.add_parser("pack", help="answers and keys in one file")
     packed.add_argument("out", type=Path, nargs="+", metavar="DIR")
     packed.add_argument("--into", type=Path, required=True, metavar="FILE.tar.xz")

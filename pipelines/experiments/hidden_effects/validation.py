@@ -27,6 +27,7 @@ from shiplog.exceptions import ShiplogError, listed
 from shiplog.nomenclature.numbers import counted
 from shiplog.report.evaluation import tables
 
+MACHINE = "an Intel Xeon"  # of docs/evidence/validation-answers.tar.xz
 SHIPMMG = "shipmmg"  # a type of ship of another package, and an MMG too
 PLACES = (goals.SAME, goals.OTHER)
 SUITES = {
@@ -72,8 +73,9 @@ def picture_of(path: Path) -> Path:
     return path.with_name(f"{path.stem}-reliability.svg")
 
 
-def page(found: Sequence[Score], path: Path | None = None) -> Page:
-    """Raises Mixed where the cases' verdicts are not all of one program, or one is there twice."""
+def page(found: Sequence[Score], path: Path | None = None, machine: str = MACHINE) -> Page:
+    """The pages; `machine` is that on which the cases were run: answers do not record it. Raises
+    Mixed where the cases' verdicts are not all of one program, or one is there twice."""
     answers = [answer for score in found for answer in score.answers]
     if not answers:
         raise ShiplogError("No case has a sealed verdict.", hint="run a suite first.")
@@ -96,7 +98,7 @@ def page(found: Sequence[Score], path: Path | None = None) -> Page:
         *([diagram] if path else []),
         OTHERS.format(misses=others[MISSES], methods=others[METHODS]),
         "## What was run",
-        _head(found, answers, of),
+        _head(found, answers, of, at),
         "## Goals, this program",
         INTERVAL,
         goals.table(by_place[goals.SAME], by_place[goals.OTHER]),
@@ -120,7 +122,7 @@ def page(found: Sequence[Score], path: Path | None = None) -> Page:
         PARAMETERS,
         ranks.coverage_table(standing),
         ranks.rank_table(standing),
-        *(part for place, given in there.items() for part in _cost(place, given)),
+        *(part for place, given in there.items() for part in _cost(place, given, machine)),
     ]
     pages = {"": first, MISSES: second, METHODS: third}
     return Page(
@@ -154,8 +156,8 @@ def three_numbers(answers: Mapping[str, Sequence[Answer]]) -> str:
 
 
 COMMAND = """\
-    python -m pipelines.experiments.hidden_effects scores docs/evidence/validation-answers.tar.xz \\
-        --markdown docs/evidence/validation.md"""
+    python -m pipelines.experiments.hidden_effects scores docs/evidence/{stem}-answers.tar.xz \\
+        --markdown docs/evidence/{stem}.md"""
 INTRODUCTION = """\
 In each case a ship makes a nominal campaign, from which a model is identified (`train --model
 mmg`). In a later trial of 7000 or 500 s (longer for a large ship) nothing is hidden, or one cause
@@ -175,9 +177,12 @@ ferry with azimuth thrusters (`azimuth_ferry`), and the KVLCC2 of the package sh
 Of these, `shipmmg` is an MMG too: its equations of motion, propeller and rudder are those of the
 model, written by another author; its hull polynomials and its wake are not. It has no wind, no bank
 and no shallow water. A [table](#each-type-of-ship) has the figures of each type, and those without
-`shipmmg`.
-
-Cases that were run:"""
+`shipmmg`."""
+HEEL = ("container", "naval_vessel")
+HEELING = """\
+Two further ships heel, which the model does not: a container ship (`container`) and a naval vessel
+(`naval_vessel`), each with equations of its own from the literature."""
+CASES = "Cases that were run:"
 LEGEND = """\
 - **x1** is a realistic size of what is hidden; **x0.3** is three tenths of it. *Size 1* and *size
   0.3* are the same.
@@ -225,9 +230,8 @@ RIVALS = {
     "glr": "- **Likelihood ratio** compares rollouts with and without each cause, the errors taken "
     "as white noise. It, too, names one cause or none.",
 }
-# The machine is that of docs/evidence/validation-answers.tar.xz: the answers do not record it.
 COST = """\
-Processor time, elapsed time and memory of `shiplog diagnose`, a case, on an Intel Xeon, each
+Processor time, elapsed time and memory of `shiplog diagnose`, a case, on {machine}, each
 case on one core. Two cases ran at a time on two cores that also had other work: elapsed time is
 longer than on a free machine. The first case of a ship includes the fit of its nominal campaign,
 which is kept for the later ones; what is hidden differs, too."""
@@ -281,13 +285,9 @@ def _once(answers: Sequence[Answer]) -> None:
         )
 
 
-def _head(found: Sequence[Score], answers: Sequence[Answer], of: str) -> str:
-    lines = [
-        COMMAND,
-        "",
-        INTRODUCTION,
-        "",
-    ]
+def _head(found: Sequence[Score], answers: Sequence[Answer], of: str, at: Path) -> str:
+    more = [HEELING, ""] if any(a.planned.family in HEEL for a in answers) else []
+    lines = [COMMAND.format(stem=at.stem), "", INTRODUCTION, "", *more, CASES, ""]
     for score in sorted(found, key=lambda one: SUITES.get(one.suite) != goals.SAME):
         done = len(score.answers)
         place = heading(SUITES.get(score.suite, score.suite))
@@ -338,11 +338,12 @@ def _methods(place: str, given: Sequence[Answer]) -> list[str]:
     ]
 
 
-def _cost(place: str, given: Sequence[Answer]) -> list[str]:
+def _cost(place: str, given: Sequence[Answer], machine: str) -> list[str]:
     rows = score_tables.times(given)
     if not rows:
         return []
-    return [f"## Cost: {place} of equations", COST, tables.table(score_tables.HEAD, rows)]
+    cost = COST.format(machine=machine)
+    return [f"## Cost: {place} of equations", cost, tables.table(score_tables.HEAD, rows)]
 
 
 def types(answers: Sequence[Answer]) -> str:
