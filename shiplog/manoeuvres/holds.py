@@ -16,6 +16,7 @@ LEAST_HOLD = 0.15  # L/V: shorter than a sharp zigzag's swing, longer than a rud
 # of 2 s, a line through 0.2 to 0.8 of the way is carried back to 0.7 s before the order.
 RAMP = (0.1, 0.5)
 ROUGHLY = (0.3, 0.5)  # where a helmsman may have been on the way already
+MOST_LOOKS = 5  # at where it stood: of a record that begins with the order two or three
 LEAST_WAY = 0.1  # of the way, between the samples of a line
 STOOD = 1.0  # s before the way begins, in which the rudder shows where it stood
 
@@ -76,10 +77,14 @@ def ordered(track: Track, before: float, hold: Hold, base: float) -> float:
     rows = np.arange(int(np.searchsorted(track.time, before)), hold.first + 1)
     if not len(rows) or hold.angle == base:
         return hold.begin
-    about = _began(track, rows, base, hold.angle, ROUGHLY)
-    still = (track.time[rows] >= about - STOOD) & (track.time[rows] <= about)
-    stood = float(np.median(track.rudder[rows[still]])) if still.any() else base
-    return about if stood == hold.angle else _began(track, rows, stood, hold.angle, RAMP)
+    at, stood = _began(track, rows, base, hold.angle, ROUGHLY), math.nan
+    for _ in range(MOST_LOOKS):  # a base that was on the way itself comes back step by step
+        still = (track.time[rows] >= at - STOOD) & (track.time[rows] <= at)
+        new = float(np.median(track.rudder[rows[still]])) if still.any() else base
+        if new in (stood, hold.angle):
+            break
+        at, stood = _began(track, rows, new, hold.angle, RAMP), new
+    return at
 
 
 def _began(

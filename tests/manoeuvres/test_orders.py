@@ -19,10 +19,10 @@ def moved(time, angle, stood, rate, lag):
     return stood + math.copysign(1.0, way) * np.where(t < limited / rate, rate * t, abs(way) - slow)
 
 
-def found(rudder, time):
+def found(rudder, time, base=0.0):
     track = Track(time, np.zeros((len(time), 6)), np.radians(rudder), np.ones(len(time)), 100.0)
     last = holds(track, 20.0)[-1]
-    return ordered(track, ORDER - 40.0, last, 0.0)
+    return ordered(track, ORDER - 40.0, last, math.radians(base))
 
 
 @pytest.mark.parametrize("stood", [0.0, 1.0, -1.0])
@@ -38,6 +38,14 @@ def test_a_feedback_in_half_degrees():
     time = np.arange(0.0, 120.0, 0.1)
     shown = np.round(2.0 * moved(time, 10.0, 0.0, 4.0, 2.0)) / 2.0
     assert found(shown, time) == pytest.approx(ORDER, abs=0.2)
+
+
+@pytest.mark.parametrize("base", [1.2, -6.0, -12.0])
+def test_a_record_that_begins_with_the_order(base):
+    """The mean angle before it is then one of its way."""
+    time = np.arange(59.5, 120.0, 0.1)
+    shown = moved(time, -35.0, 1.2, 16.0, 1e-6)
+    assert found(shown, time, base) == pytest.approx(ORDER, abs=0.1)
 
 
 def test_a_way_of_one_step_begins_at_the_last_sample_before_it():
