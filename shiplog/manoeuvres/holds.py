@@ -11,7 +11,14 @@ from shiplog.manoeuvres.track import Track
 
 HELD = math.radians(1.5)  # about its mean: a feedback counts in steps of up to half a degree
 LEAST_HOLD = 0.15  # L/V: shorter than a sharp zigzag's swing, longer than a rudder's way over
-RAMP = (0.2, 0.8)  # of the way from one hold to the next: the part that is a straight line
+# Of the way from one hold to the next, the part that is a straight line. A steering gear goes at
+# its full rate first and slows down towards the angle ordered: of 10 deg at 4 deg/s and with a lag
+# of 2 s, a line through 0.2 to 0.8 of the way is carried back to 0.7 s before the order.
+RAMP = (0.1, 0.5)
+ROUGHLY = (0.3, 0.5)  # where a helmsman may have been on the way already
+MOST_LOOKS = 5  # at where it stood: of a record that begins with the order two or three
+LEAST_WAY = 0.1  # of the way, between the samples of a line
+STOOD = 1.0  # s before the way begins, in which the rudder shows where it stood
 
 
 @dataclass(frozen=True)
@@ -63,19 +70,36 @@ def holds(track: Track, length_time: float) -> list[Hold]:
 def ordered(track: Track, before: float, hold: Hold, base: float) -> float:
     """When the rudder was ordered from `base` [rad] to a hold, not before that time [s].
 
-    The line through the middle of its way, back to where it came from: a rudder turns at a
-    constant rate. Where its way has less than two samples, the last one before it.
+    The line through the first half of its way, back to where it stood: a gear turns a rudder at
+    a constant rate first. Where it stood is its median over the second before it moved: a helmsman
+    who keeps a course is off his mean angle.
     """
-    way = hold.angle - base
     rows = np.arange(int(np.searchsorted(track.time, before)), hold.first + 1)
-    if not len(rows) or way == 0.0:
+    if not len(rows) or hold.angle == base:
         return hold.begin
-    share = (track.rudder[rows] - base) / way
-    early = np.flatnonzero(share <= RAMP[0])
+    at, stood = _began(track, rows, base, hold.angle, ROUGHLY), math.nan
+    for _ in range(MOST_LOOKS):  # a base that was on the way itself comes back step by step
+        still = (track.time[rows] >= at - STOOD) & (track.time[rows] <= at)
+        new = float(np.median(track.rudder[rows[still]])) if still.any() else base
+        if new in (stood, hold.angle):
+            break
+        at, stood = _began(track, rows, new, hold.angle, RAMP), new
+    return at
+
+
+def _began(
+    track: Track, rows: np.ndarray, stood: float, to: float, ramp: tuple[float, float]
+) -> float:
+    """When the line through that share of the way [rad] was at its beginning. Where there are less
+    than two samples of it, the last one before them."""
+    share = (track.rudder[rows] - stood) / (to - stood)
+    over = np.flatnonzero(share >= ramp[1])
+    end = int(over[0]) if len(over) else len(rows)
+    early = np.flatnonzero(share[:end] <= ramp[0])
     last = int(early[-1]) if len(early) else 0
-    middle = rows[last:][(share[last:] > RAMP[0]) & (share[last:] < RAMP[1])]
-    x = (track.rudder[middle] - base) / way
-    if len(middle) < 2 or np.ptp(x) < 0.1:
+    middle = rows[last + 1 : end]
+    x = share[last + 1 : end]
+    if len(middle) < 2 or np.ptp(x) < LEAST_WAY:
         return float(track.time[rows[last]])
     slope, at = np.polyfit(x, track.time[middle], 1)
     if slope < 0.0:

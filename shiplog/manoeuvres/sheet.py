@@ -162,7 +162,7 @@ def _recorded(
 ) -> Entry:
     own = measure.measured(found, profile, record.step)
     models = [
-        simulated.as_recorded(s, found, record, own.corrected, members)
+        simulated.as_recorded(s, found, record, own.drift, members)
         if s is not None and own.quantities
         else None
         for s in sailors
@@ -204,7 +204,7 @@ def _full_load(
     """R = T F/B; None where it is not asked for, or cannot be worked out."""
     if deep is None or ballast is None:
         return None
-    loaded = simulated.as_recorded(deep, found, record, own.corrected, members, revolutions=False)
+    loaded = simulated.as_recorded(deep, found, record, own.drift, members, revolutions=False)
     if loaded is None:
         return None
     return loading.full_load(own.quantities, ballast.each, loaded.each)

@@ -26,6 +26,7 @@ from shiplog.manoeuvres.quantity import Estimate
 from shiplog.manoeuvres.recognition import Found
 from shiplog.manoeuvres.stretches import driving, steering
 from shiplog.manoeuvres.track import Track
+from shiplog.nomenclature.frames import in_body_axes
 from shiplog.ship_profile.profile import Profile
 from shiplog.simulation.sailing import Sailed, Water
 from shiplog.simulation.schedules import Manoeuvre, PullOut, Spiral, Stop, Turn, Zigzag
@@ -38,6 +39,7 @@ LOW, HIGH = 0.05, 0.95
 LEAST_SHARE = 0.8
 OUTSIDE_NOTE = "outside the training data"
 STEP_HOLD = 3.0  # L/V of a step of a spiral or pull-out
+LEAST_APPROACH = 0.2  # of the speed over ground, that a current leaves through the water
 LONGER = 1.5  # times the recorded manoeuvre's length, for which it is simulated
 
 
@@ -193,14 +195,18 @@ def as_recorded(
     sailor: Sailor,
     found: Found,
     record: Record,
-    corrected: bool,
+    moved: Drift | None,
     members: int = MEMBERS,
     revolutions: bool = True,
 ) -> Simulated | None:
-    """The same manoeuvre as a recorded one: its angles, its approach, its wind, its revolutions.
+    """The same manoeuvre as a recorded one: its angles, its approach, its wind, its revolutions,
+    and its current.
 
-    corrected    whether a current was taken out of the record; the model has none
+    moved        what was taken out of the record as a current: a current c, and what the wind added
     revolutions  those of the record; else what keeps the model at that speed
+
+    A turn is sailed in c = moved - m, m the model's own drift in the recorded wind and still water:
+    an approach over ground is then one through the water. What moves the model is taken out again.
 
     None of a kind that is not sailed by itself, or where the ship was not under way.
     """
@@ -211,11 +217,12 @@ def as_recorded(
     state = found.track.state[row]
     speed = found.approach.speed if found.approach else float(state[1])
     own = float(state[1]) if state[1] > 0.0 else speed
-    wind = (0.0, 0.0)
+    wind, recorded = (0.0, 0.0), None
     during = (record.time >= found.begin) & (record.time <= found.end)
     if sailor.profile.has_wind and during.any():
         north, east = record.true_wind[during].mean(0)
         wind = (float(north), float(east))
+        recorded = _by_rows(record.true_wind[during], record.time[during] - found.begin, sailor.row)
     seconds = LONGER * (found.end - found.begin)
     driven = record.actuator[during] if during.any() else record.actuator[:1]
     approach = np.median(driven, axis=0) if revolutions else None
@@ -226,12 +233,36 @@ def as_recorded(
             return None
         last = np.append(positions[0], max(seconds, positions[0][-1] + 1.0))
         positions = last, np.concatenate((driven, driven[-1:]))
-    sailed, outside = sailor.sail(
-        manoeuvre, speed=own, water=Water(wind=wind), members=members, seconds=seconds,
-        approach=approach, motion=(float(state[4]), float(state[3]), float(state[5])),
-        positions=positions,
-    )  # fmt: skip
-    return of_sailed(sailed, outside, manoeuvre, sailor.profile, corrected)
+
+    heading, sway, rate = float(state[4]), float(state[3]), float(state[5])
+
+    def sail_in(north: float, east: float, count: int) -> tuple[Sailed, Outside]:
+        """From a speed and a sway over ground, in a current."""
+        c, s = math.cos(heading), math.sin(heading)
+        ahead, starboard = in_body_axes(north, east, c, s)
+        return sailor.sail(
+            manoeuvre, speed=max(own - ahead, LEAST_APPROACH * own), members=count, seconds=seconds,
+            water=Water(wind, (north, east), recorded), approach=approach, positions=positions,
+            motion=(heading, sway - starboard, rate),
+        )  # fmt: skip
+
+    north, east = 0.0, 0.0
+    if moved is not None:
+        still = track_of(sail_in(north, east, 1)[0], 0, sailor.profile)
+        drifts = drift.of_turn(still, 0.0, found.side) if len(still) > 2 else None
+        if drifts is not None:
+            north, east = (moved.velocity - drifts.velocity).tolist()
+    sailed, outside = sail_in(north, east, members)
+    return of_sailed(sailed, outside, manoeuvre, sailor.profile, moved is not None)
+
+
+def _by_rows(wind: np.ndarray, time: np.ndarray, row: float) -> np.ndarray:
+    """Its mean in each row [K, 2] from the order on, as long as there is one in every row."""
+    at = np.floor(time / row + 1e-9).astype(int)
+    count = np.bincount(at)
+    whole = int(np.argmin(count > 0)) if (count == 0).any() else len(count)
+    sums = np.stack([np.bincount(at, weights=wind[:, i]) for i in (0, 1)], axis=-1)
+    return sums[:whole] / count[:whole, None]
 
 
 def of_found(found: Found) -> Manoeuvre | None:

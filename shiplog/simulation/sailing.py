@@ -4,15 +4,16 @@
 
 ν by explicit Euler at the step that the model was identified with, as its rollouts are (Eq. 9);
 place and heading by the trapezoidal rule of it, since no fit makes up for what Euler's loses. The
-wind over ground and the current are even and steady. d is each member's draw of what the model is
-known to get wrong (`discrepancy`), zero for the model as it stands.
+current is even and steady, and so is the wind over ground where none was recorded. d is each
+member's draw of what the model is known to get wrong (`discrepancy`), zero for the model as it
+stands.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -34,11 +35,21 @@ Disturbance = Callable[[np.ndarray, np.ndarray, float], np.ndarray]
 
 @dataclass(frozen=True)
 class Water:
-    """wind     [2] where it comes from over ground, along x₀ and y₀, m/s
-    current  [2] where it sets, along x₀ and y₀, m/s"""
+    """wind      [2] where it comes from over ground, along x₀ and y₀, m/s
+    current   [2] where it sets, along x₀ and y₀, m/s
+    recorded  [K, 2] the wind in each row from the start on; after them it is `wind`"""
 
     wind: tuple[float, float] = (0.0, 0.0)
     current: tuple[float, float] = (0.0, 0.0)
+    recorded: np.ndarray | None = field(default=None, compare=False)
+
+    def blowing(self, rows: int) -> np.ndarray:
+        """[rows, 2] over ground."""
+        found = np.tile(np.array(self.wind, dtype=float), (rows, 1))
+        if self.recorded is not None:
+            known = self.recorded[:rows]
+            found[: len(known)] = known
+        return found
 
 
 STILL = Water()
@@ -133,7 +144,7 @@ def sail(
     count, rows = len(start), max(1, math.ceil(steps.seconds / steps.row))
     step = steps.row / steps.substeps
     current = np.array(water.current)
-    blowing = np.tile(np.array(water.wind) + current, (count, 1))  # over the water
+    winds = water.blowing(rows) + current  # over the water
     state = np.array(start, dtype=float)
     state[:, [1, 3]] -= _across(state[:, 4], current)
     ends, diverged = np.full(count, math.inf), np.full(count, math.inf)
@@ -144,6 +155,7 @@ def sail(
     with np.errstate(all="ignore"):  # a member may diverge
         for k in range(rows * steps.substeps):
             time = k * step
+            blowing = np.tile(winds[k // steps.substeps], (count, 1))
             if measured:
                 acts = acting = order.actuators
             else:

@@ -207,3 +207,17 @@ def test_schedules_that_are_none(tmp_path, text, says):
 def test_a_schedule_that_is_not_there(tmp_path):
     with pytest.raises(ShiplogError, match="cannot be read"):
         schedules.read(tmp_path / "none.csv", profiles.load("kvlcc2"))
+
+
+def test_a_recorded_wind_blows_row_by_row_and_its_mean_after_it():
+    """u̇ is the wind's part along x₀, in two Euler steps a row."""
+
+    def pushed(state, actuator, wind):
+        return np.stack((wind[:, 0], *np.zeros((2, len(state)))), axis=-1)
+
+    recorded = np.array([[0.1, 0.0], [0.3, 0.0], [-0.2, 0.0]])
+    water, of, sticks = Water((0.5, 0.0), recorded=recorded), Turn(math.radians(0.1)), controls()
+    made = helm(of, sticks, start(), 20.0)
+    found = sail(pushed, made, sticks, start(), Steps(5.0, 1.0, 2, LIMITS), water=water)
+    gained = found.state[0, :, 1] - SPEED
+    assert gained == pytest.approx([0.0, 0.1, 0.4, 0.2, 0.7, 1.2])

@@ -7,6 +7,7 @@ import polars as pl
 import pytest
 
 from shiplog.training.physics import trust
+from shiplog.training.physics.agreement import Agreement
 from shiplog.training.physics.trust import Information
 
 BOUNDS = (np.full(2, -10.0), np.full(2, 10.0))
@@ -21,7 +22,7 @@ def identified(values=(1.0, 2.0), spread=(0.5, 2.0), free=(True, True), start=(0
     )  # fmt: skip
 
 
-def judged(gram, frame=None, covariance=None, pulls=None):
+def judged(gram, frame=None, covariance=None, pulls=None, agreed=None):
     """gram   H in units of the spreads, shared out evenly over the voyages that have a pull"""
     frame = identified() if frame is None else frame
     scale = frame["spread"].to_numpy()
@@ -33,7 +34,7 @@ def judged(gram, frame=None, covariance=None, pulls=None):
         {name: H / np.outer(scale, scale) / len(pulls) for name in pulls},
         {name: pull / scale for name, pull in pulls.items()},
     )
-    return trust.judge(frame, covariance, BOUNDS, found, "a textbook")
+    return trust.judge(frame, covariance, BOUNDS, found, "a textbook", agreed)
 
 
 def test_what_the_data_show_and_what_they_do_not():
@@ -70,6 +71,21 @@ def test_voyages_that_do_not_agree():
     assert one.between == pytest.approx(0.5 * math.sqrt((2 * w * d**2 - 1.0) / w))
     assert one.verdict == "only in combination" and "do not agree" in one.reason
     assert other.between == 0.0 and other.voyages == 2 and other.verdict == "trusted"
+
+
+def test_parts_of_the_data_that_do_not_agree():
+    """0.3 of the spread by chance and 0.4 by disagreement are ½; more is no longer trusted."""
+    H = [[1 / 0.09 - 1.0, 0.0], [0.0, 99.0]]
+    for apart, verdict, own in ((0.39, "trusted", 0.492), (0.8, "only in combination", 0.854)):
+        agreed = Agreement(np.array([apart, 0.0]), ("slow and fast windows", ""))
+        one, other = judged(H, agreed=agreed)
+        assert (one.verdict, other.verdict) == (verdict, "trusted")
+        assert one.own == pytest.approx(own, abs=1e-3) and one.apart == pytest.approx(0.5 * apart)
+        assert one.high == pytest.approx(1.0 + 1.645 * 0.5 * own, abs=1e-3)
+    assert one.reason == (
+        "slow and fast windows do not agree on it: its error is 0.85 of the plausible spread, and "
+        "0.3 if they did"
+    )
 
 
 def test_at_a_limit_an_interval_means_nothing():

@@ -159,7 +159,7 @@ def _quantities(truth: list[dict[str, Any]], runs: list[Path], store: Path) -> l
             own = measure.measured(found, profile, record.step)
             columns["measured"] = own.quantities
             for label, sailor in zip(MODELS, sailors, strict=False):
-                sailed = simulated.as_recorded(sailor, found, record, own.corrected, MEMBERS)
+                sailed = simulated.as_recorded(sailor, found, record, own.drift, MEMBERS)
                 columns[label] = {} if sailed is None else sailed.quantities
         for name, value in one["true"].items():
             row = {

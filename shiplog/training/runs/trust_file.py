@@ -9,8 +9,8 @@ import numpy as np
 from shiplog.machine import files
 from shiplog.nomenclature.contract import CONTRACT
 from shiplog.simulation.sensitivities import normal
-from shiplog.simulation.window_series import pick, series
-from shiplog.training.physics import trust
+from shiplog.simulation.window_series import Normal, WindowSeries, series
+from shiplog.training.physics import agreement, trust
 from shiplog.training.physics.output_error import residual_variance
 from shiplog.training.physics.trust import CoefficientTrust, Information
 from shiplog.training.runs.load_model import PhysicalRun, Run
@@ -28,13 +28,15 @@ def of_run(run: Run) -> tuple[CoefficientTrust, ...]:
     voyages. An empty tuple of a network, of a run that was fitted to nothing, and of an extended
     one: its coefficients were fitted again together with its causes, and no interval was kept.
 
-    A run that was made before there was a trust.json gets one, if its folder can be written.
+    A run that was made before there was a trust.json, or before there was `apart` in it, gets a
+    new one, if its folder can be written.
     """
     if run.given or run.extension is not None or not isinstance(run, PhysicalRun):
         return ()
     path = run.path / FILE
-    if path.is_file():
-        return _read(run)
+    kept = _read(run) if path.is_file() else None
+    if kept is not None:
+        return kept
     if (run.path / SHEET).is_file():
         return ()
     judged = judge(run)
@@ -54,20 +56,26 @@ def judge(run: PhysicalRun) -> tuple[CoefficientTrust, ...]:
     data, count = series(cut), identified.height
     every = normal(simulator.model, simulator.theta, data, tuple(range(count)))
     kappa = _factor(run, every.loss)
-    variance = kappa * residual_variance(every.loss, data)
-    voyages = np.array(cut.plan["voyage"].to_list())
-    grams, pulls = {}, {}
-    for voyage in dict.fromkeys(voyages.tolist()):
-        own = pick(data, voyages == voyage)
-        one = normal(simulator.model, simulator.theta, own, tuple(range(count)))
-        grams[voyage], pulls[voyage] = one.gram / variance, one.pull.sum(0) / variance
+    fitted = residual_variance(every.loss, data)
+    voyages = cut.plan["voyage"].to_list()
+
+    def of(part: WindowSeries) -> Normal:
+        return normal(simulator.model, simulator.theta, part, tuple(range(count)))
+
+    parts = agreement.groups(data, agreement.partitions(data, voyages), of)
+    each = parts.get(agreement.VOYAGES) or [agreement.Group(every.gram, every.pull.sum(0))]
+    names_of = dict.fromkeys(voyages)
+    variance = kappa * fitted
+    grams = {name: one.gram / variance for name, one in zip(names_of, each, strict=True)}
+    pulls = {name: one.pull / variance for name, one in zip(names_of, each, strict=True)}
     nominal = run.nominal()
-    covariance = trust.on_new_voyages(
-        simulator.covariance[:count, :count], identified["spread"].to_numpy(), kappa
-    )
+    spread, free = identified["spread"].to_numpy(), identified["free"].to_numpy()
+    free = free & (spread > 0.0)
+    agreed = agreement.agreement(parts, fitted, np.where(free, spread, 1.0), free)
+    covariance = trust.on_new_voyages(simulator.covariance[:count, :count], spread, kappa)
     return trust.judge(
         identified, covariance, (nominal.low, nominal.high), Information(grams, pulls),
-        run.config.physics.parameters or nominal.source,
+        run.config.physics.parameters or nominal.source, agreed,
     )  # fmt: skip
 
 
@@ -89,11 +97,13 @@ def save(run: Run, judged: tuple[CoefficientTrust, ...]) -> None:
     files.write_json(run.path / FILE, content)
 
 
-def _read(run: Run) -> tuple[CoefficientTrust, ...]:
-    """Raises RunError."""
+def _read(run: Run) -> tuple[CoefficientTrust, ...] | None:
+    """None where a program wrote it that did not compare parts of the data. Raises RunError."""
     path = run.path / FILE
     found = run_files.json_of(path)
     try:
+        if any("apart" not in one for one in found["coefficients"]):
+            return None
         return tuple(trust.from_json(one) for one in found["coefficients"])
     except (KeyError, TypeError, ValueError) as error:
         raise run_files.unreadable(path, error) from error
