@@ -19,9 +19,8 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import chi2
 
-from shiplog.live import alarm_threshold
+from shiplog.live import alarm_threshold, calibration
 from shiplog.live.alarm import Thresholds, Watcher
-from shiplog.live.alarm_threshold import tail_of
 from shiplog.live.segment_products import Directions
 
 RATES = (24.0, 6.0, 1.0)
@@ -50,16 +49,12 @@ def known(folder: Path) -> dict[str, Known]:
         with np.load(path) as kept:
             r, q, _ = (int(n) for n in kept["widths"])
             causes = {k.removeprefix("cause "): kept[k] for k in kept.files if k[:6] == "cause "}
-            count = int(kept["segments"])
-            tails = (
-                tail_of(kept["peaks"], count, alarm_threshold.SCALE, alarm_threshold.OPTIMISM),
-                tail_of(kept["logs"], count, alarm_threshold.UNEXPLAINED_SCALE),
-            )
             name = path.stem.removeprefix("calibration-")
+            median, tails = calibration.tails_of(kept)
             found[name] = Known(
                 name, Directions(np.zeros(1), np.zeros((1, r)), np.zeros((1, q)), causes,
                                  float(kept["counts"])),
-                float(kept["median"]), tails, float(kept["segment_s"]),
+                median, tails, float(kept["segment_s"]),
             )  # fmt: skip
     return found
 
