@@ -96,8 +96,8 @@ def tail_of(values: np.ndarray, per: float, segments: int, prior: Excesses) -> T
 
 
 def peaks_of(voyages: Sequence[np.ndarray], stretch: int = STRETCH) -> tuple[np.ndarray, float]:
-    """The greatest of each `stretch` values in a row [n], none across two voyages, a shorter rest
-    of half of it included; and of how many values it is on average."""
+    """The greatest of each `stretch` values in a row [n], none across two voyages, a rest of
+    more than half of it included; and of how many values it is on average."""
     stretch = max(min(stretch, sum(map(len, voyages)) // FEWEST_PEAKS), 1)
     blocks = [
         values[at : at + stretch]

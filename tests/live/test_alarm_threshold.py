@@ -113,10 +113,10 @@ def test_a_rate_beyond_the_tail_has_its_start_for_a_threshold():
 
 
 def test_peaks_are_of_one_voyage_each():
-    long, short = np.arange(STRETCH + STRETCH // 2, dtype=float), np.array([7.0])
+    long, short = np.arange(STRETCH + STRETCH // 2 + 1.0), np.array([7.0])
     peaks, per = peaks_of([long, short, long, long])
-    assert peaks.tolist() == [19.0, 29.0, 7.0, 19.0, 29.0, 19.0, 29.0]
-    assert per == pytest.approx((3 * (20 + 10) + 1) / 7)
+    assert peaks.tolist() == [19.0, 30.0, 7.0, 19.0, 30.0, 19.0, 30.0]
+    assert per == pytest.approx((3 * (20 + 11) + 1) / 7)
     few, per = peaks_of([np.arange(16.0)])
     assert len(few) == FEWEST_PEAKS and per == 4.0
 
