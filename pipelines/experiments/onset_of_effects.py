@@ -1,6 +1,6 @@
 """When hidden effects begin: the truth against the onset that a diagnosis gives.
 
-    python -m pipelines.experiments.onset_of_effects WORK [--cases 64] [--first 0]
+    python -m pipelines.experiments.onset_of_effects WORK [--cases 64] [--first 0] [--others 0]
 
 Four ships of three families (`simulated_ship`, `other_families`), which share no equation with
 shiplog's model. Each is identified once from nominal voyages. Its trials are two short voyages with
@@ -59,6 +59,7 @@ from shiplog.voyages.windows.split import choose_physical_split
 log = logging.getLogger(__name__)
 
 SHIPS = (("simulated_ship", 7101), ("abkowitz", 21), ("catamaran", 22), ("azimuth_ferry", 23))
+# `--others N` adds N to these seeds: ships and weather with which no number of the onset was set.
 NOMINAL_S, TRIAL_S = 3400.0, 1800.0
 PATTERNS = ("start", "later", "on_off", "later")  # one case after another
 NEAR_ENDS_S = 90.0  # a beginning or an end is at least so far from those of the trial
@@ -333,8 +334,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("work", type=Path, help="a folder for ships and answers")
     parser.add_argument("--cases", type=int, default=64, help="the last one is below this")
     parser.add_argument("--first", type=int, default=0, help="number of the first one")
+    parser.add_argument("--others", type=int, default=0, help="other ships: added to their seeds")
     given = parser.parse_args(arguments)
-    simulators = [Simulator(*one) for one in SHIPS]
+    simulators = [Simulator(family, seed + given.others) for family, seed in SHIPS]
     ships: dict[Simulator, Ship] = {}
     given.work.mkdir(parents=True, exist_ok=True)
     answers = given.work / f"answers-{given.first}.jsonl"

@@ -1,11 +1,12 @@
 """The alarm: the evidence of a change against the threshold of the user's rate of false alarms.
 
-Half of the rate is for a change of a cause of the bank (log Z_n), half for a segment that none of
-them explains (χ²_s). After an alarm the evidence that raises the next one begins anew; while it
-crosses the threshold again within QUIET_SEGMENTS the alarm stands. What is suspected follows from
-all segments since the alarm stands and before it, and another suspect is reported only where it
-is more probable by SURER nats. An alarm is a suspicion: it names what fits best of a short bank,
-and no more.
+Half of the rate is for a change of a cause of the bank (log Z_n), half for segments that none of
+them explains: the least log χ²_s/χ̃² of LASTING in a row. A single one is a hard manoeuvre now and
+then, for which a model is wrong, and how wrong a campaign does not show. After an alarm the
+evidence that raises the next one begins anew; while it crosses the threshold again within
+QUIET_SEGMENTS the alarm stands. What is suspected follows from all segments since the alarm stands
+and before it, and another suspect is reported only where it is more probable by SURER nats. An
+alarm is a suspicion: it names what fits best of a short bank, and no more.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from shiplog.live.change_evidence import ChangeEvidence, Evidence
 from shiplog.live.segment_products import Directions
 
 SHARED = 0.5  # of the rate, for each of the two statistics
+LASTING = 3  # segments in a row that no cause explains
 QUIET_SEGMENTS = 20  # without a crossing, after which an alarm is over
 MOST_SUSPECTS = 3
 SURER = 5.0  # nats
@@ -55,7 +57,8 @@ class Alarm:
 
 @dataclass(frozen=True)
 class Thresholds:
-    """c of log Z_n and of log χ²_s/χ̃², and whether the rate is beyond what was made to see it."""
+    """c of log Z_n and of the lasting log χ²_s/χ̃², and whether the rate is beyond what was made to
+    see it."""
 
     change: float
     unexplained: float
@@ -78,6 +81,7 @@ class Watcher:
     ends      ns, of the segments of `evidence`
     quiet     segments since the threshold was crossed last; None where it never was
     named     the suspect that was reported last
+    squares   log χ²_s/χ̃² of the last LASTING segments of a voyage
     """
 
     directions: Directions
@@ -89,7 +93,7 @@ class Watcher:
     quiet: int | None = None
     named: str = ""
     latest: Evidence | None = None
-    square: float = 0.0
+    squares: list[float] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.evidence, self.alert = self._empty(), self._empty()
@@ -101,7 +105,17 @@ class Watcher:
         """Another voyage differs from the one before as voyages do; an alarm that stands stays."""
         self.evidence.restart()
         self.alert.restart()
-        self.ends = []
+        self.ends, self.squares = [], []
+
+    @property
+    def square(self) -> float:
+        """log χ²_s/χ̃² of the last segment."""
+        return self.squares[-1] if self.squares else 0.0
+
+    @property
+    def lasting(self) -> float:
+        """The least log χ²_s/χ̃² of the last LASTING segments."""
+        return min(self.squares) if len(self.squares) == LASTING else -math.inf
 
     @property
     def stands(self) -> bool:
@@ -115,14 +129,14 @@ class Watcher:
     def add_product(self, product: np.ndarray, end: int) -> Alarm | None:
         """The same of H_s [N, N]."""
         square = change_evidence.unexplained(product, self.directions.counts)
-        self.square = math.log(max(square, 1e-9) / self.median)
+        self.squares = [*self.squares, math.log(max(square, 1e-9) / self.median)][-LASTING:]
         weighed = change_evidence.weight(self.evidence.alone(product)) * product
         self.latest = self.evidence.add(weighed)
         most = change_evidence.MOST_PARTS * change_evidence.PART
         self.ends = [*self.ends, end][-most:]
         statistic = self.alert.add(weighed).total if self.stands else self.latest.total
         change = statistic - self.thresholds.change
-        other = self.square - self.thresholds.unexplained
+        other = self.lasting - self.thresholds.unexplained
         if max(change, other) > 0.0:
             return self._crossed(change > 0.0, statistic, end)
         self._calm()
@@ -145,7 +159,7 @@ class Watcher:
             return None
         self.named = first
         if not explained:
-            statistic = self.square
+            statistic = self.lasting
         threshold = self.thresholds.change if explained else self.thresholds.unexplained
         return Alarm(end, statistic, threshold, suspects, not explained, stood)
 
@@ -176,3 +190,11 @@ def places(causes: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         found[label] = np.arange(at, at + len(columns))
         at += len(columns)
     return found
+
+
+def lasting_squares(logs: np.ndarray) -> np.ndarray:
+    """The least log χ²_s/χ̃² of each LASTING segments in a row [S - LASTING + 1], of one voyage's
+    [S]."""
+    if len(logs) < LASTING:
+        return np.zeros(0)
+    return np.lib.stride_tricks.sliding_window_view(logs, LASTING).min(1)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from shiplog.diagnosis.linear import segments
-from shiplog.live import alarm_threshold, change_evidence, segment_products
-from shiplog.live.alarm import Thresholds, Watcher, places
+from shiplog.live import alarm_threshold, change_evidence, left_out, segment_products
+from shiplog.live.alarm import LASTING, Thresholds, Watcher, lasting_squares, places
 from shiplog.live.alarm_threshold import Tail, peaks_of, tail_of
 from shiplog.live.change_evidence import ChangeEvidence
 from shiplog.live.nominal import Nominal
@@ -19,11 +20,12 @@ from shiplog.live.segment_products import Directions
 from shiplog.machine import disk_cache, files
 
 FOLDER = "watched"
+KEPT = ("change", "square", "voyage")
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """median  χ̃² of the campaign's segments; tails of log Z_n and of log χ²_s/χ̃²"""
+    """median  χ̃² of the campaign's segments; tails of log Z_n and of the lasting log χ²_s/χ̃²"""
 
     directions: Directions
     median: float
@@ -44,54 +46,60 @@ class Calibration:
 
 
 def calibrated(nominal: Nominal) -> Calibration:
-    """Of a nominal campaign, each voyage of it watched with what the others say."""
+    """Of a nominal campaign, each voyage of it watched with what the others say. Raises
+    np.linalg.LinAlgError."""
     directions = segment_products.directions(nominal.campaign)
+    median, tails = tails_of(watched(nominal, directions))
+    return Calibration(directions, median, tails, nominal.grid.seconds)
+
+
+def watched(nominal: Nominal, directions: Directions) -> dict[str, np.ndarray]:
+    """The nominal voyages, each watched with what the others say: log Z_n (`change`) and χ²_s
+    (`square`) of every segment and its `voyage` [S]; worked out once for a campaign."""
     kept = _place(nominal, directions)
     known = _read(kept)
     if known is None:
-        known = _made(nominal)
+        known = _watched(nominal)
         _keep(kept, known)
-    median, *numbers = known.tolist()
-    change, other = (Tail(at, by, int(count)) for at, by, count in (numbers[:3], numbers[3:]))
-    return Calibration(directions, median, (change, other), nominal.grid.seconds)
+    return known
 
 
-def watched_voyages(nominal: Nominal) -> tuple[list[list[float]], list[float]]:
-    """log Z_n of each nominal voyage, and χ²_s of all segments."""
+def _watched(nominal: Nominal) -> dict[str, np.ndarray]:
     campaign = nominal.campaign
     rows = segments.begins(nominal.record)
     grams = segment_products.grams(campaign.reference, nominal.grid, nominal.record, rows)
     of = nominal.record.voyage[rows]
-    alike = len(campaign.voyages) == len(nominal.record.names)
-    totals: list[list[float]] = []
-    squares: list[float] = []
-    for number in range(len(nominal.record.names)):
-        if not (of == number).any():
-            continue
-        directions = segment_products.directions(campaign, number if alike else -1)
-        evidence = ChangeEvidence(directions.widths, places(directions.causes))
-        here: list[float] = []
-        for gram in (grams[i] for i in np.flatnonzero(of == number)):
-            if gram[0, 0] <= 0.0:  # the model diverged on it
-                continue
-            product = directions.products(gram)
-            squares.append(change_evidence.unexplained(product, directions.counts))
-            weight = change_evidence.weight(evidence.alone(product))
-            here.append(evidence.add(weight * product).total)
-        totals.append(here)
-    return totals, squares
+    found: list[tuple[float, float, int]] = []
+    for voyages, others in left_out.folds(campaign, of):
+        directions = segment_products.directions(others)
+        for number in voyages.tolist():
+            evidence = ChangeEvidence(directions.widths, places(directions.causes))
+            for gram in (grams[i] for i in np.flatnonzero(of == number)):
+                if gram[0, 0] <= 0.0:  # the model diverged on it
+                    continue
+                product = directions.products(gram)
+                square = change_evidence.unexplained(product, directions.counts)
+                weight = change_evidence.weight(evidence.alone(product))
+                found.append((evidence.add(weight * product).total, square, number))
+    change, squares, voyage = np.array(found, float).reshape(-1, 3).T
+    return {"change": change, "square": squares, "voyage": voyage.astype(int)}
 
 
-def _made(nominal: Nominal) -> np.ndarray:
-    totals, squares = watched_voyages(nominal)
-    median = float(np.median(squares))
-    count = sum(map(len, totals))
-    peaks = np.concatenate([peaks_of(one) for one in totals if one])
-    change = tail_of(peaks, count, alarm_threshold.SCALE, alarm_threshold.OPTIMISM)
-    logs = peaks_of(np.log(np.maximum(squares, 1e-9) / median).tolist())
-    other = tail_of(logs, count, alarm_threshold.UNEXPLAINED_SCALE)
-    numbers = [value for t in (change, other) for value in (t.location, t.scale, t.segments)]
-    return np.array([median, *numbers], float)
+def tails_of(known: Mapping[str, np.ndarray]) -> tuple[float, tuple[Tail, Tail]]:
+    """Of `watched` voyages χ̃², and what is known of the next values of the two statistics. Raises
+    ValueError where they are too few."""
+    median = float(np.median(known["square"]))
+    logs = np.log(np.maximum(known["square"], 1e-9) / median)
+    each = [known["voyage"] == number for number in np.unique(known["voyage"])]
+    change, per = peaks_of([known["change"][here] for here in each])
+    lasting, few = peaks_of([lasting_squares(logs[here]) for here in each], LASTING)
+    if len(lasting) < 2:  # voyages of a few segments: single ones are further out
+        lasting, few = logs, 1.0
+    count = len(logs)
+    return median, (
+        tail_of(change, per, count, alarm_threshold.CHANGE),
+        tail_of(lasting, few, count, alarm_threshold.UNEXPLAINED),
+    )
 
 
 def _place(nominal: Nominal, directions: Directions) -> Path:
@@ -99,21 +107,22 @@ def _place(nominal: Nominal, directions: Directions) -> Path:
     for array in (directions.mean, directions.of_part, directions.of_all, nominal.record.state,
                   nominal.record.actuator, nominal.record.wind):  # fmt: skip
         digest.update(np.ascontiguousarray(array).tobytes())
-    return disk_cache.folder() / FOLDER / f"{digest.hexdigest()}.npy"
+    return disk_cache.folder() / FOLDER / f"{digest.hexdigest()}.npz"
 
 
-def _read(path: Path) -> np.ndarray | None:
+def _read(path: Path) -> dict[str, np.ndarray] | None:
     try:
-        found = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile):
+        with np.load(path, allow_pickle=False) as arrays:
+            found = {name: arrays[name] for name in KEPT}
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None
-    return found if found.shape == (7,) and np.isfinite(found).all() else None
+    return found if all(np.isfinite(values).all() for values in found.values()) else None
 
 
-def _keep(path: Path, numbers: np.ndarray) -> None:
+def _keep(path: Path, found: Mapping[str, np.ndarray]) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with files.whole(path) as partial, partial.open("wb") as stream:
-            np.save(stream, numbers)
+            np.savez(stream, **dict(found))  # pyright: ignore[reportArgumentType]
     except OSError:  # a cache that cannot be written is no fault
         return

@@ -20,7 +20,7 @@ def arrays(watcher: Watcher) -> dict[str, np.ndarray]:
 
 
 def facts(watcher: Watcher) -> dict[str, Any]:
-    return {"quiet": watcher.quiet, "named": watcher.named}
+    return {"quiet": watcher.quiet, "named": watcher.named, "squares": watcher.squares}
 
 
 def restore(watcher: Watcher, kept: dict[str, np.ndarray], said: dict[str, Any]) -> bool:
@@ -36,5 +36,6 @@ def restore(watcher: Watcher, kept: dict[str, np.ndarray], said: dict[str, Any])
         one.since = list(kept[f"{name}_since"])
         one.parts = list(kept[f"{name}_parts"])
     watcher.ends = [int(time) for time in kept["ends"]]
+    watcher.squares = [float(value) for value in said.get("squares", [])]
     watcher.quiet, watcher.named = said.get("quiet"), str(said.get("named", ""))
     return True

@@ -23,6 +23,7 @@ from shiplog.diagnosis.nominal import (
 from shiplog.diagnosis.nominal.campaign_characteristics import groups_of
 from shiplog.diagnosis.nominal.campaign_prior import prior
 from shiplog.diagnosis.nominal.nominal_fit import Converged
+from shiplog.live import left_out
 from shiplog.models.causes import CATALOGUE
 from shiplog.models.starting_values import Start
 
@@ -238,6 +239,32 @@ def test_a_prior_without_a_part_has_less_and_all_of_them_the_same(learned):
         assert gone.max() > 0.0
     nobody, _ = made.prior_without(-1)
     assert nobody == pytest.approx(ref.information)
+
+
+def test_a_voyage_that_is_left_out_has_no_say(learned):
+    """Neither in coefficients nor in how far parts and voyages differ: with other products of that
+    voyage nothing changes, with other products of those that stay it does."""
+    _, made = learned
+    voyages = np.unique(made.voyage)
+    assert len(voyages) == 2
+
+    def with_other(number):
+        """Parts of a voyage whose errors are three times as large, and coupled otherwise."""
+        scale = np.append(3.0, np.linspace(0.5, 2.0, len(made.each[0]) - 1))
+        each = [one * np.outer(scale, scale) if of == number else one
+                for one, of in zip(made.each, made.voyage, strict=True)]  # fmt: skip
+        return left_out.without(replace(made, each=tuple(each)), voyages[:1])
+
+    plain = left_out.without(made, voyages[:1])
+    assert set(plain.voyage) == set(voyages[1:]) and len(plain.each) < len(made.each)
+    same, other = with_other(voyages[0]), with_other(voyages[1])
+    assert (same.effects.deviation == plain.effects.deviation).all()
+    assert (same.apart, same.reference.counts) == (plain.apart, plain.reference.counts)
+    for one, two in zip(same.prior_without(-1, 0.5), plain.prior_without(-1, 0.5), strict=True):
+        assert (one == two).all()
+    assert not np.allclose(other.prior_without(-1)[1], plain.prior_without(-1)[1])
+    folds = list(left_out.folds(made, made.voyage))
+    assert [out.tolist() for out, _ in folds] == [[0], [1]]
 
 
 def test_what_is_left_of_a_campaign_has_nothing_that_its_parts_differ_by(learned):

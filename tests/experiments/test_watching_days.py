@@ -2,9 +2,11 @@
 
 import json
 
+import numpy as np
 import pytest
+from scipy.stats import linregress
 
-from pipelines.experiments.watching import false_alarms, rates, replayed
+from pipelines.experiments.watching import days, false_alarms, rates, replayed
 
 ALARM = {"segment": 3, "suspect": "current", "nats": 9.0}
 
@@ -37,3 +39,14 @@ def test_what_a_verdict_dates_to_a_voyage_is_found_wherever_it_stands():
     verdict = {"causes": [{"voyages": [{"voyage": "b"}]}], "intervals": intervals}
     assert replayed.diagnosed(verdict, "b") == ["3 to 9 s: A force of 18 N astern."]
     assert replayed.diagnosed(verdict, "c") == [] == replayed.diagnosed(None, "b")
+
+
+def test_a_slope_of_memory_is_that_of_a_regression_by_scipy():
+    at = np.arange(1.0, 31.0)
+    memory = 290.0 + 2.5 / 24.0 * at + np.random.default_rng(3).normal(0.0, 0.1, 30)
+    memory[:10] -= 40.0  # it fills at first
+    found, low, high = days.slope(at, memory)
+    scipys = linregress(at[10:] / 24.0, memory[10:])
+    assert found == pytest.approx(scipys.slope)
+    assert (high - low) / 2.0 == pytest.approx(1.7341 * scipys.stderr, rel=1e-4)  # t of 18, 95 %
+    assert np.isnan(days.slope(at[:4], memory[:4])[0])

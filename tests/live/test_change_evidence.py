@@ -9,7 +9,6 @@ import pytest
 
 from shiplog.live import evidence_file, kept
 from shiplog.live.alarm import Alarm, Thresholds, Watcher
-from shiplog.live.alarm_threshold import Tail, per_segment, tail_of
 from shiplog.live.change_evidence import PART, ChangeEvidence
 from shiplog.live.kept import KeptRows, Saved
 from shiplog.live.segment_products import Directions
@@ -150,6 +149,7 @@ def test_a_watch_goes_on_from_its_file_as_if_it_had_not_ended(tmp_path):
         after.add_product(h, i)
     assert after.latest == whole.latest
     assert (after.named, after.quiet, after.ends) == (whole.named, whole.quiet, whole.ends)
+    assert after.squares == whole.squares
 
 
 def test_what_is_damaged_or_of_another_model_is_no_state(tmp_path):
@@ -170,24 +170,22 @@ def test_memory_is_bounded():
     assert sizes[-1] == sizes[49]
 
 
-def test_a_threshold_is_crossed_as_often_as_was_asked():
-    """Peaks drawn from a Gumbel distribution by numpy, not by the formula that is tested."""
-    rng = np.random.default_rng(8)
-    tail = Tail(location=-1.0, scale=1.2, segments=100)
-    peaks = rng.gumbel(tail.location, tail.scale, 200_000)
-    for a_day in (24.0, 6.0, 1.0):
-        share = per_segment(a_day, 30.0) * PART
-        seen = float((peaks > tail.threshold(share / PART)).mean())
-        assert seen == pytest.approx(share, rel=0.15)
-    assert tail.extrapolated(per_segment(1.0, 30.0))
-    assert not tail.extrapolated(per_segment(100.0, 30.0))
+def outliers(at: list[int], count: int = 30) -> list[Alarm]:
+    """Alarms of a watch of segments of which these have six times the χ² of the others, whatever
+    the cause."""
+    directions = Directions(np.zeros(1), np.zeros((1, R)), np.zeros((1, Q)), CAUSES, 1.0)
+    watcher = Watcher(directions, Thresholds(math.inf, 1.0, False), median=5.0)
+    H = np.zeros((count, 1 + sum(WIDTHS), 1 + sum(WIDTHS)))
+    H[:, 0, 0] = 5.0
+    H[at, 0, 0] = 30.0
+    return [a for i, h in enumerate(H) if (a := watcher.add_product(h, i)) is not None]
 
 
-def test_the_tail_of_many_peaks_is_their_own():
-    rng = np.random.default_rng(9)
-    tail = tail_of(rng.gumbel(2.0, 3.0, 20_000), 400_000, scale=1.0)
-    assert tail.scale == pytest.approx(3.0, rel=0.03)
-    assert tail.location == pytest.approx(2.0, abs=0.1)
+def test_one_segment_that_nothing_explains_raises_no_alarm_and_three_in_a_row_do():
+    assert outliers([5]) == outliers([5, 6]) == outliers([5, 6, 8, 9, 11]) == []
+    (alarm,) = outliers([5, 6, 7])
+    assert (alarm.time, alarm.unexplained, alarm.suspects) == (7, True, ())
+    assert alarm.statistic == pytest.approx(math.log(6.0))
 
 
 def test_kept_rows_are_of_the_last_hours(tmp_path):

@@ -28,7 +28,7 @@ from pipelines.experiments.watching import rates, sailing, segments_kept
 from pipelines.experiments.watching.rates import DAY_S, RATES, Known
 from shiplog.live import segment_products
 
-FIRST = 200_000  # hours after FIRST_DAY, and the seed of weather and noise
+FIRST = 300_000  # hours after FIRST_DAY, and the seed of weather and noise
 
 
 def done(out: Path) -> list[dict[str, Any]]:
@@ -59,11 +59,11 @@ def watched(ship: Known, products) -> dict[str, list[dict[str, Any]]]:
 def watch_legs(ships: Path, kept: Path, out: Path, days: float, only: list[str]) -> None:
     """Legs of one ship after another, each ship's share of the days; the ships in turn."""
     known = rates.known(kept)
-    chosen = [s for s in sailing.FIVE if s.name in known and (not only or s.name in only)]
+    chosen = [s for s in sailing.SHIPS if s.name in known and (not only or s.name in only)]
     there = {s: segments_kept.campaign_of(ships / s.name) for s in chosen}
     maps = {s: segment_products.directions(of.campaign) for s, of in there.items()}
     before = {(one["ship"], one["leg"]) for one in done(out)}
-    legs = round(days * DAY_S / sailing.LEG_S / len(sailing.FIVE))
+    legs = round(days * DAY_S / sailing.LEG_S / len(chosen))
     with out.open("a", encoding="utf-8") as stream:
         for number in range(FIRST, FIRST + legs):
             for ship, of in there.items():

@@ -13,15 +13,14 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from scipy.stats import chi2
 
-from shiplog.live import alarm_threshold
+from shiplog.live import alarm_threshold, calibration
 from shiplog.live.alarm import Thresholds, Watcher
-from shiplog.live.alarm_threshold import tail_of
 from shiplog.live.segment_products import Directions
 
 RATES = (24.0, 6.0, 1.0)
@@ -50,16 +49,12 @@ def known(folder: Path) -> dict[str, Known]:
         with np.load(path) as kept:
             r, q, _ = (int(n) for n in kept["widths"])
             causes = {k.removeprefix("cause "): kept[k] for k in kept.files if k[:6] == "cause "}
-            count = int(kept["segments"])
-            tails = (
-                tail_of(kept["peaks"], count, alarm_threshold.SCALE, alarm_threshold.OPTIMISM),
-                tail_of(kept["logs"], count, alarm_threshold.UNEXPLAINED_SCALE),
-            )
             name = path.stem.removeprefix("calibration-")
+            median, tails = calibration.tails_of(kept)
             found[name] = Known(
                 name, Directions(np.zeros(1), np.zeros((1, r)), np.zeros((1, q)), causes,
                                  float(kept["counts"])),
-                float(kept["median"]), tails, float(kept["segment_s"]),
+                median, tails, float(kept["segment_s"]),
             )  # fmt: skip
     return found
 
@@ -75,19 +70,45 @@ def interval(count: int) -> tuple[float, float]:
     return float(low), float(0.5 * chi2.ppf(0.95, 2 * count + 2))
 
 
-def false_alarms(ship: Known, folder: Path, per_day: float) -> tuple[int, float, Counter[str]]:
-    """Alarms in sailing without a change, the days of it, and what was suspected. Every leg is a
-    voyage of its own weather, watched one after the other; an alarm that stands ends with it."""
-    count, seconds, suspects = 0, 0.0, Counter()
+@dataclass
+class Calm:
+    """Sailing without a change: alarms, the days of it, and what was suspected."""
+
+    count: int = 0
+    days: float = 0.0
+    suspects: Counter[str] = field(default_factory=Counter)
+
+
+def false_alarms(ship: Known, folder: Path) -> dict[float, Calm]:
+    """Rate → what was raised in sailing without a change. Every leg is a voyage of its own weather,
+    watched one after the other; an alarm that stands ends with it."""
+    found = {per_day: Calm() for per_day in RATES}
     for H in legs(folder, ship.name):
-        watcher = ship.watcher(per_day)
-        for i, one in enumerate(H):
-            alarm = watcher.add_product(one, i)
-            if alarm is not None and not alarm.again:
-                count += 1
-                suspects[alarm.suspects[0].name if alarm.suspects else "unknown"] += 1
-        seconds += len(H) * ship.segment_s
-    return count, seconds / DAY_S, suspects
+        change, other = highest(ship, H)
+        for per_day, calm in found.items():
+            calm.days += len(H) * ship.segment_s / DAY_S
+            watcher = ship.watcher(per_day)
+            of = watcher.thresholds
+            if change <= of.change and other <= of.unexplained:
+                continue
+            for i, one in enumerate(H):
+                alarm = watcher.add_product(one, i)
+                if alarm is not None and not alarm.again:
+                    calm.count += 1
+                    calm.suspects[alarm.suspects[0].name if alarm.suspects else "unknown"] += 1
+    return found
+
+
+def highest(ship: Known, products: np.ndarray) -> tuple[float, float]:
+    """The greatest log Z_n and lasting log χ² of a leg: where neither is above its threshold there
+    is no alarm."""
+    watcher = Watcher(ship.directions, Thresholds(np.inf, np.inf, False), ship.median)
+    change, other = -np.inf, -np.inf
+    for i, one in enumerate(products):
+        watcher.add_product(one, i)
+        assert watcher.latest is not None
+        change, other = max(change, watcher.latest.total), max(other, watcher.lasting)
+    return change, other
 
 
 @dataclass(frozen=True)
@@ -236,12 +257,17 @@ def main() -> None:
     parser.add_argument("kept", type=Path)
     folder = parser.parse_args().kept
     there = known(folder)
+    calm = {ship.name: false_alarms(ship, folder) for ship in there.values()}
     for per_day in RATES:
-        count, days = 0, 0.0
-        for ship in there.values():
-            own, lasted, suspects = false_alarms(ship, folder, per_day)
-            print(f"  {ship.name}: {own} in {lasted:.2f} days, {dict(suspects)}")
-            count, days = count + own, days + lasted
+        for name, each in calm.items():
+            own = each[per_day]
+            low, high = interval(own.count)
+            print(
+                f"  {name}: {own.count} in {own.days:.2f} days, {own.count / own.days:.2f} a day "
+                f"({low / own.days:.2f} to {high / own.days:.2f}), {dict(own.suspects)}"
+            )
+        count = sum(each[per_day].count for each in calm.values())
+        days = sum(each[per_day].days for each in calm.values())
         low, high = interval(count)
         between = f"{low / days:.2f} to {high / days:.2f}"
         print(

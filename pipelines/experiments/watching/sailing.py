@@ -48,6 +48,13 @@ FIVE = (
     Ship("home1", 9101), Ship("home2", 9102), Ship("home3", 9103),
     Ship("abkowitz", 9104, "abkowitz"), Ship("catamaran", 9105, "catamaran"),
 )  # fmt: skip
+# With these no number of the alarm was set: they show whether it serves other ships, too.
+OTHERS = (
+    Ship("home4", 9106), Ship("abkowitz2", 9107, "abkowitz"),
+    Ship("catamaran2", 9108, "catamaran"), Ship("ferry", 9109, "azimuth_ferry"),
+    Ship("dp", 9110, "linear_dp"),
+)  # fmt: skip
+SHIPS = FIVE + OTHERS
 
 
 def offered(ship: Ship) -> list[str]:

@@ -74,7 +74,7 @@ def main() -> None:
 
 
 def compare(given: argparse.Namespace) -> None:
-    (ship,) = (s for s in sailing.FIVE if s.name == given.ship)
+    (ship,) = (s for s in sailing.SHIPS if s.name == given.ship)
     run = load_model.load(given.ships / ship.name / "base")
     of, known = segments_kept.campaign_of(given.ships / ship.name), rates.known(given.kept)
     directions = segment_products.directions(of.campaign)

@@ -1,7 +1,7 @@
 """Products H_s of every segment of a leg, kept in a file: the watch is then tried on them at will.
 
     python -m pipelines.experiments.watching.segments_kept SHIPS OUT --legs 20 [--first 0]
-    python -m pipelines.experiments.watching.segments_kept SHIPS OUT --half-way 60
+    python -m pipelines.experiments.watching.segments_kept SHIPS OUT --half-way 60 [--first 0]
     python -m pipelines.experiments.watching.segments_kept SHIPS OUT --calibrate
 
 SHIPS holds a folder a ship with `store` and `base`, as `hidden_effects` makes them.
@@ -19,7 +19,6 @@ from pipelines.experiments.watching import sailing
 from shiplog.diagnosis.linear import segments
 from shiplog.live import calibration, nominal, segment_products
 from shiplog.live.alarm import places
-from shiplog.live.alarm_threshold import peaks_of
 from shiplog.live.nominal import Nominal
 from shiplog.machine import files
 from shiplog.training.runs import load_model
@@ -52,23 +51,22 @@ def products(of: Nominal, record: Record, directions: segment_products.Direction
 def keep_calibrations(there: dict[sailing.Ship, Nominal], maps: dict, out: Path) -> None:
     """What the nominal campaign of each ship says of its alarm, as `shiplog watch` learns it."""
     for ship, of in there.items():
-        totals, squares = calibration.watched_voyages(of)
-        median = float(np.median(squares))
-        peaks = np.concatenate([peaks_of(one) for one in totals if one])
-        logs = peaks_of(np.log(np.array(squares) / median).tolist())
         causes: dict[str, Any] = {
             f"cause {label}": at for label, at in places(maps[ship].causes).items()
         }
         np.savez(
-            out / f"calibration-{ship.name}.npz", peaks=peaks, logs=logs, median=median,
-            segments=len(squares), segment_s=of.grid.seconds, widths=maps[ship].widths,
-            counts=maps[ship].counts, **causes,
+            out / f"calibration-{ship.name}.npz", segment_s=of.grid.seconds,
+            widths=maps[ship].widths, counts=maps[ship].counts,
+            **calibration.watched(of, maps[ship]), **causes,
         )  # fmt: skip
 
 
-def half_ways(there: dict[sailing.Ship, Nominal], count: int) -> list[tuple[sailing.Ship, str]]:
-    """Ship and cause of so many voyages, drawn of the causes of its bank."""
-    rng = np.random.default_rng(68)
+def half_ways(
+    there: dict[sailing.Ship, Nominal], count: int, first: int
+) -> list[tuple[sailing.Ship, str]]:
+    """Ship and cause of so many voyages, drawn of the causes of its bank; `first`, of their
+    numbers, is part of the seed."""
+    rng = np.random.default_rng([68, first])
     found = []
     for number in range(count):
         ship = sailing.FIVE[number % len(sailing.FIVE)]
@@ -80,10 +78,12 @@ def half_ways(there: dict[sailing.Ship, Nominal], count: int) -> list[tuple[sail
     return found
 
 
-def keep_half_ways(there: dict[sailing.Ship, Nominal], maps: dict, out: Path, count: int) -> None:
+def keep_half_ways(
+    there: dict[sailing.Ship, Nominal], maps: dict, out: Path, count: int, first: int
+) -> None:
     """H_s of each such voyage, the ends of its segments, and what was hidden from when on."""
-    rng = np.random.default_rng(69)
-    for number, (ship, cause) in enumerate(half_ways(there, count)):
+    rng = np.random.default_rng([69, first])
+    for number, (ship, cause) in enumerate(half_ways(there, count, first), first):
         size = float(0.25 ** rng.uniform(0.0, 1.0))  # of the realistic size, 0.25 to 1
         path = out / f"half-{number:03d}.npz"
         if path.exists() or ship not in there:
@@ -111,14 +111,14 @@ def main() -> None:
     parser.add_argument("--only", nargs="*", default=())
     given = parser.parse_args()
     given.out.mkdir(parents=True, exist_ok=True)
-    ships = [s for s in sailing.FIVE if not given.only or s.name in given.only]
+    ships = [s for s in sailing.SHIPS if not given.only or s.name in given.only]
     there = {s: campaign_of(given.ships / s.name) for s in ships if (given.ships / s.name).exists()}
     maps = {s: segment_products.directions(of.campaign) for s, of in there.items()}
     if given.calibrate:
         keep_calibrations(there, maps, given.out)
         return
     if given.half_way:
-        keep_half_ways(there, maps, given.out, given.half_way)
+        keep_half_ways(there, maps, given.out, given.half_way, given.first)
         return
     for number in range(given.first, given.first + given.legs):
         for ship, of in there.items():
