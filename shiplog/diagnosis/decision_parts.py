@@ -26,7 +26,6 @@ class Parts:
     slight            a remainder that explains little puts no name in doubt
     ordinary_noise    process noise that is raised a little is nominal
     ordinary_spreads  the same, as far as voyages differ
-    level             no dependence has changed where the errors are no greater than nominal ones
     pattern           a force is one device by its pattern, not by the course alone
     """
 
@@ -44,7 +43,6 @@ class Parts:
     slight: bool = True
     ordinary_noise: bool = True
     ordinary_spreads: bool = True
-    level: bool = True
     pattern: bool = True
 
 

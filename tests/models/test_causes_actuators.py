@@ -74,17 +74,6 @@ def orders(**columns) -> Orders:
     return Orders.of(replace(RECORD, actuator=values))
 
 
-def test_only_the_curve_of_a_single_units_force_has_a_nominal_part():
-    """A law of thrust or lift errs at large and at small orders. All units together are the sum of
-    the single ones, and a rate or a stretch in which it stands is no curve."""
-    moved = replace(setting(), orders=orders(**{n: [1.0, 8.0] for n in TWIN.actuator_names}))
-    chosen, _ = catalogue.testable(moved)
-    curves = {c.label for c in chosen if c.name.startswith("actuator") and c.nominal}
-    assert curves == {
-        f"actuator_{name}:{unit}" for name in ("limit", "dead_band") for unit in TWIN.actuator_names
-    }
-
-
 def test_what_never_moved_is_not_testable():
     """An order that is constant says nothing of its unit; one that moves is tested by itself."""
     still = replace(setting(), orders=orders(propeller=[3.0, 3.0], rudder_port=[0.5, -0.5]))

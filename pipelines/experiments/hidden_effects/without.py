@@ -55,7 +55,6 @@ AFTER_SEARCH: Mapping[str, Parts] = {
     "slight": Parts(slight=False),
     "ordinary-noise": Parts(ordinary_noise=False),
     "ordinary-spreads": Parts(ordinary_spreads=False),
-    "level": Parts(level=False),
     "pattern": Parts(pattern=False),
 }
 GROUPS = {"before-search": BEFORE_SEARCH, "after-search": AFTER_SEARCH}

@@ -74,7 +74,7 @@ def decide_trial(
             run, nominal, recorded, causes, lacking, numbers, barred=barred, parts=parts,
             excluded=excluded,
         )  # fmt: skip
-        as_nominal = parts.level and cut is not None and not judge_of(made.trial).worse_than_nominal
+        as_nominal = cut is not None and not judge_of(made.trial).worse_than_nominal
         made = replace(made, trial=share(replace(made.trial, as_nominal=as_nominal)))
         return _searched(run, made, reach, parts, numbers, nominal is None and run.given)
 
