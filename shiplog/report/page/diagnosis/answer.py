@@ -27,8 +27,8 @@ TO_DO = {
     "coverage": "Record voyages in these conditions, train again, then diagnose again.",
     "external": "Leave these stretches out, or record what pushed the ship there.",
 }
-CALIBRATED = "Of the answers that are given with 0.9, nine in ten are right."
-NONE_STATED = "An answer is named from 0.9 on, where nine in ten are right."
+CALIBRATED = "On simulated ships nine in ten of the answers that were given with 0.9 were right."
+NONE_STATED = "An answer is named from 0.9 on: on simulated ships nine in ten were right there."
 SEPARATES = "A test that separates"  # begins the note of it
 NO_TEST = (
     "Do not change the model yet: it is not known which of these acts. No test that would separate "
