@@ -92,7 +92,7 @@ def page(found: Sequence[Score], path: Path | None = None, machine: str = MACHIN
     others = {behind: page_of(at, behind).name for behind in (MISSES, METHODS)}
     diagram = f"![Share true over the reported probability]({picture_of(at).name})"
     first = [
-        "# Validation on hidden effects",
+        _title(found),
         THREE,
         three_numbers(there),
         *([diagram] if path else []),
@@ -283,6 +283,14 @@ def _once(answers: Sequence[Answer]) -> None:
             f"{counted(len(twice), 'case')} there twice: {listed(p.label for p in twice)}.",
             hint="give every test once: a replay holds the cases of the test it replays.",
         )
+
+
+def _title(found: Sequence[Score]) -> str:
+    """Of the page: a third of the cases of these suites are actuators, lines and tows."""
+    devices = all(score.suite.startswith("devices") for score in found)
+    return (
+        "# Validation on actuators, lines and tows" if devices else "# Validation on hidden effects"
+    )
 
 
 def _head(found: Sequence[Score], answers: Sequence[Answer], of: str, at: Path) -> str:
