@@ -60,10 +60,9 @@ JUDGEMENTS: dict[str, str] = {
         "nothing else."
     ),
     "cybership": (
-        "Right that no cause explains it. Both runs are of one campaign, and nothing is known to "
-        "have changed. The named cause takes 3 % of the error away, which the answer itself calls "
-        "insignificant: water whose depth is the same everywhere has no shallowest place. The "
-        "model is poor, since the commands are those of Voith Schneider propellers."
+        "Believable. Both runs are of one campaign, and nothing is known to have changed. The model "
+        "is poor, since the commands are those of Voith Schneider propellers, so that only large "
+        "changes would have shown."
     ),
     "dalian": (
         "Right. The file is one run of four minutes, and 39 s of it are left for a test. What the "
