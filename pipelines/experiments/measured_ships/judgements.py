@@ -60,9 +60,9 @@ JUDGEMENTS: dict[str, str] = {
         "nothing else."
     ),
     "cybership": (
-        "Believable. Both runs are of one campaign, and nothing is known to have changed. The model "
-        "is poor, since the commands are those of Voith Schneider propellers, so that only large "
-        "changes would have shown."
+        "Believable. Both runs are of one campaign, and nothing is known to have changed. The "
+        "model is poor, since the commands are those of Voith Schneider propellers, so that only "
+        "large changes would have shown."
     ),
     "dalian": (
         "Right. The file is one run of four minutes, and 39 s of it are left for a test. What the "
