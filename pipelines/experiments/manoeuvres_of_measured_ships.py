@@ -8,7 +8,7 @@ Prints the tables of docs/evidence/manoeuvres.md. The data are not shipped: give
 kvlcc2   identified from HSVA's thirteen zigzags at 1:45.7 alone; MARIN's two circles and four
          zigzags, measured at full scale and brought to that of the model by Froude's law
 esso     turns of each day predicted by a model of all zigzags and random voyages, and of the other
-         day's turns
+         day's turns; and the yaw acceleration that the model lacks before and in them
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import logging
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 import polars as pl
 
 from pipelines.experiments.esso_osaka import TWIN, trials_store
@@ -26,14 +27,17 @@ from shiplog.commands.convert import convert
 from shiplog.commands.identify import identify_run
 from shiplog.commands.manoeuvres import manoeuvres_of
 from shiplog.commands.prepare import expand, ingest_logs
+from shiplog.manoeuvres import recognition, stretches
 from shiplog.report.evaluation.text_table import table
 from shiplog.ship_profile import file as profiles
+from shiplog.training.runs import load_model
 from shiplog.training.settings.run_config import Config
 from shiplog.voyages.store.store import Store
 from shiplog.voyages.windows.split_settings import Split
 
 DAYS = ("14-Sep", "14-Oct")  # of the Esso Osaka's turns
 MEMBERS = 200
+PHASES = ((-30.0, 0.0), (0.0, 20.0), (40.0, 150.0))  # s from the order: approach, entry, circles
 QUANTITIES = ("advance", "tactical_diameter", "first_overshoot", "second_overshoot")
 
 
@@ -64,13 +68,49 @@ def kvlcc2(folder: Path, out: Path) -> pl.DataFrame:
 def esso(folder: Path, out: Path) -> pl.DataFrame:
     store = trials_store(folder, out / "esso")
     names = [e.name for e in store.entries() if e.name != TWIN]
-    found = []
+    found, lacking = [], []
     for day in DAYS:
         turns = [n for n in names if n.startswith("turn") and day in n]
         others = [n for n in names if n not in turns and not n.startswith("berthing")]
         run = identified(store, others, out / f"esso-mmg-without-{day}")
         found.append(manoeuvres_of([run], store, turns, members=MEMBERS).frame)
+        lacking += [row for name in turns for row in missing_yaw(run, store, name)]
+    print(yaw_table(pl.DataFrame(lacking)), end="\n\n")
     return pl.concat(found).filter(kind="turn")
+
+
+def missing_yaw(path: Path, store: Store, name: str) -> list[dict[str, str | float]]:
+    """Of each turn of a voyage, the yaw acceleration measured less the model's at the measured
+    motion, as means over PHASES, mrad/s², positive to starboard."""
+    run = load_model.load(path)
+    own = run.simulator(run.config.seeds[0])
+    record = stretches.read(store, name, run.profile)
+    modelled = np.asarray(
+        own.model.acceleration(own.theta, record.state, record.actuator, record.true_wind)
+    )[:, 2]
+    rows = []
+    for one in recognition.recognise(name, stretches.tracks(record)):
+        if one.kind != "turn":
+            continue
+        row: dict[str, str | float] = {"side": "starboard" if one.side > 0.0 else "port"}
+        for first, last in PHASES:
+            ends = one.begin + first, min(one.begin + last, one.end)
+            during = (record.time >= ends[0]) & (record.time < ends[1])
+            gained = np.diff(np.interp(ends, record.time, record.state[:, 5]))[0]
+            lacking = float(gained / (ends[1] - ends[0]) - modelled[during].mean())
+            row[f"{first:.0f} to {last:.0f} s"] = 1e3 * lacking
+        rows.append(row)
+    return rows
+
+
+def yaw_table(rows: pl.DataFrame) -> str:
+    found = rows.group_by("side", maintain_order=True).agg(pl.len().alias("turns"), pl.all().mean())
+    phases = found.columns[2:]
+    cells = [
+        (r["side"], r["turns"], *(f"{r[phase]:+.1f}" for phase in phases))
+        for r in found.iter_rows(named=True)
+    ]
+    return table(("turn to", "turns", *phases), cells, ("turns", *phases))
 
 
 def compared(frame: pl.DataFrame) -> pl.DataFrame:

@@ -108,6 +108,11 @@ def _case(number: int, extended: bool) -> cases.Case:
     )  # fmt: skip
 
 
+def nominal_case(number: int) -> cases.Case:
+    """A ship of which nothing changes."""
+    return _case(number, False)
+
+
 def _runs(case: cases.Case, folder: Path, extended: bool) -> list[Path]:
     """The model, and where a diagnosis names something, the extended one."""
     store, run, more = folder / "store", folder / "run", folder / "extended"
