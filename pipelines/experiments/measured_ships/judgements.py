@@ -12,11 +12,11 @@ JUDGEMENTS: dict[str, str] = {
     ),
     "esso-osaka, published": (
         "Believable in part. The position's clock is right: the sensors alone give 0.95 s between "
-        "position and velocity. So are a wind force athwart and turning of about half the "
-        "published one, which the random tests give by themselves, too, and a rudder force that "
-        "is larger: the coefficients identified from all voyages have 1.29. The wind force ahead "
-        "is not: these have 1.25. How fast the screw's revolutions change is confirmed by nothing "
-        "else. A third of the error is unexplained."
+        "position and velocity. So is the wind force: the coefficients identified from all "
+        "voyages have 1.25 times the published one ahead and 0.47 times the yaw moment, and 0.81 "
+        "times athwart. How fast the screw's revolutions change is confirmed by nothing else. The "
+        "rudder's force, which those coefficients have 1.29 times as large, is missing from the "
+        "answer. Half of the error is unexplained."
     ),
     "kvlcc2": (
         "Believable. All zigzags are of one series. On these six windows a plain regression "
