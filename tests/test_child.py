@@ -220,7 +220,9 @@ def outcome(text):
         # of many words, the last
         ("[os.write(pipe, b'x' * 4096) for _ in range(40)]; os.write(pipe, b'last')",
          [9, child.LAST_BYTES, "last"]),
-        ("os.kill(os.getppid(), signal.SIGTERM); time.sleep(600)", [-signal.SIGTERM, 0, ""]),
+        # once the parent waits: a signal before that ends it, and the child with it
+        ("time.sleep(1.0); os.kill(os.getppid(), signal.SIGTERM); time.sleep(600)",
+         [-signal.SIGTERM, 0, ""]),
     ],
     ids=["nothing", "abort", "many words", "a signal to the parent"],
 )  # fmt: skip
