@@ -122,11 +122,12 @@ def _refuted(
 ) -> tuple[frozenset[str], str] | None:
     """Of causes whose whole interval is a loss, and that the windows can judge, the one whose loss
     is most certain, and why; together with another one from which it is hard to separate."""
-    worse = [(one, lost) for one, gain in asked if (lost := gain.worse) and judges(one)]
+    worse = [(one, gain, lost) for one, gain in asked if (lost := gain.worse) and judges(one)]
     if not worse:
         return None
-    one, (low, high) = min(worse, key=lambda pair: pair[1][1])
-    loss = f"the error is {-high:.1%} to {-low:.1%} greater"
+    one, gain, (low, high) = min(worse, key=lambda given: given[2][1])
+    whose = " of the typical window" if (low, high) == gain.typical else ""
+    loss = f"the error{whose} is {-high:.1%} to {-low:.1%} greater"
     name = one.cause.name
     for other in (n.cause for n, _ in asked if n.cause.name != one.cause.name):
         if other.name in one.cause.separated_by or name in other.separated_by:
