@@ -359,6 +359,14 @@ PLANING = sailed(
     drives={"rudder": lambda t: R(20) * np.sin(0.21 * t + 0.2) + R(12) * np.sin(0.087 * t + 0.1),
             "propeller": lambda t: 20 + 3 * np.sin(0.05 * t + 0.1)},
 )  # fmt: skip
+# North for five minutes, then stopped and turned by a right angle, and astern: west, as a ship would
+# sail ahead that was never turned, with a heading that counts the other way.
+TURNED_ASTERN = sailed(
+    700.0, lambda t: R(0.9) * ((t > 300) & (t < 400)) + R(0.3) * np.sin(0.1 * t),
+    lambda t: 2.0 * np.interp(t, [300, 400], [1.0, -1.0]) + 0.2 * np.sin(0.05 * t),
+    lambda t: 0.1 * np.sin(0.03 * t),
+    drives={"rudder": none, "propeller": lambda t: 5.0 * np.interp(t, [300, 400], [1.0, -1.0])},
+)  # fmt: skip
 SOUND = {  # ship, its length, instruments, actuators
     "turning": (SHIP, 10.0, punctual, None),
     "coarse": (SHIP, 10.0, coarse, None),
@@ -399,6 +407,7 @@ SOUND = {  # ship, its length, instruments, actuators
     "course kept in waves": (steered(900.0, course_keeping, full, waves=3.0, wind=0.5), 20.0,
                              punctual, None),
     "crash stops": (steered(900.0, zigzag, crash_stops), 20.0, punctual, None),
+    "astern on another course": (TURNED_ASTERN, 20.0, punctual, None),
     "set astern by the stream": (
         steered(900.0, course_keeping, lambda *now: 2.5,
                 current=(-3.0 * math.cos(0.7), -3.0 * math.sin(0.7))), 20.0, punctual, None,

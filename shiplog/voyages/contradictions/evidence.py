@@ -182,7 +182,8 @@ def gather(t: Track) -> Evidence:
 
 
 def _way(j: Joined) -> Way | None:
-    """None where no formula joins heading and way, or several do: on one straight course."""
+    """None where no formula joins heading and way, or several do: on one straight course, or where
+    the ship goes ahead and astern by turns."""
     if "as it is" not in j.fits or "current" not in j.extra:
         return None
     left = j.left
@@ -193,6 +194,9 @@ def _way(j: Joined) -> Way | None:
         best = "as it is"
     if left[best] > JOINED:
         return None
+    if left["as it is"] > LEAST_MIRRORED and j.extra["by turns"] * BETTER < left["as it is"]:
+        if best == "as it is" or j.extra["by turns"] < BETTER * left[best]:
+            return None
     ahead = pairs.natural(j.fits[best]) and (in_radians or not pairs.natural(j.fits["as it is"]))
     if best != "as it is" and left["as it is"] < LEAST_MIRRORED and not ahead:
         return None

@@ -10,8 +10,9 @@ current of a log that counts through the water, all small beforehand. Heading ag
 
     Δψ = k ∫r dt - τ Δr + b T
 
-Heading against the way that the ship goes: X = ∫ |V| e^{iψ} dt. The way's own turning against the
-yaw rate, from one window to the next: Δ arg Δp = k ∫r dt.
+Heading against the way that the ship goes: X = ∫ |V| e^{iψ} dt, and of a ship that goes ahead and
+astern by turns X = ∫ s |V| e^{iψ} dt, s = ±1 the sign of V along e^{iψ}. The way's own turning
+against the yaw rate, from one window to the next: Δ arg Δp = k ∫r dt.
 """
 
 from __future__ import annotations
@@ -178,9 +179,12 @@ def position_and_velocity(t: Track, moved: UnderWay) -> Joined:
 
 def heading_and_way(t: Track, moved: UnderWay) -> Iterator[Joined]:
     """The way over ground of the position, and that of a velocity over ground, against
-    ∫ |V| e^{iψ} dt."""
+    ∫ |V| e^{iψ} dt. `by turns` is what the same heading leaves of a ship that goes ahead and
+    astern: on two courses at right angles, one of them astern, a mirrored heading would fit, too."""
     w, speed = moved.windows, np.abs(t.velocity)
     as_is = sailed(t, w, speed * t.ahead)
+    along = np.where(np.real(t.over_ground * t.ahead.conj()) < 0.0, -speed, speed)
+    by_turns = sailed(t, w, along * t.ahead)
     tried = {"as it is": as_is, "mirrored": sailed(t, w, speed * t.ahead.conj())}
     radians: Sailed | None = None
     for way in (moved.by_position,) if t.body else (moved.by_position, moved.by_velocity):
@@ -196,6 +200,8 @@ def heading_and_way(t: Track, moved: UnderWay) -> Iterator[Joined]:
             current = float(np.hypot(*drifting.theta[-2:]))
             _, angle, _, half = drifting.polar()
             extra = {"drifting": drifting.left, "current": current, "angle": angle, "half": half}
+        if either := complex_fit(t, w, way, by_turns, False, 0.0):
+            extra["by turns"] = either.left
         yield Joined(fits, len(way), w.seconds, _spread(way), extra=extra)
 
 
