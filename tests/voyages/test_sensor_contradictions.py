@@ -359,8 +359,8 @@ PLANING = sailed(
     drives={"rudder": lambda t: R(20) * np.sin(0.21 * t + 0.2) + R(12) * np.sin(0.087 * t + 0.1),
             "propeller": lambda t: 20 + 3 * np.sin(0.05 * t + 0.1)},
 )  # fmt: skip
-# North for five minutes, then stopped and turned by a right angle, and astern: west, as a ship would
-# sail ahead that was never turned, with a heading that counts the other way.
+# North for five minutes, then stopped and turned by a right angle, and astern: west, as a ship
+# would sail ahead that turned to port, with a heading that counts the other way.
 TURNED_ASTERN = sailed(
     700.0, lambda t: R(0.9) * ((t > 300) & (t < 400)) + R(0.3) * np.sin(0.1 * t),
     lambda t: 2.0 * np.interp(t, [300, 400], [1.0, -1.0]) + 0.2 * np.sin(0.05 * t),

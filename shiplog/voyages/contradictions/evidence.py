@@ -194,9 +194,9 @@ def _way(j: Joined) -> Way | None:
         best = "as it is"
     if left[best] > JOINED:
         return None
-    if left["as it is"] > LEAST_MIRRORED and j.extra["by turns"] * BETTER < left["as it is"]:
-        if best == "as it is" or j.extra["by turns"] < BETTER * left[best]:
-            return None
+    by_turns = BETTER * j.extra["by turns"] < left["as it is"] > LEAST_MIRRORED
+    if by_turns and (best == "as it is" or j.extra["by turns"] < BETTER * left[best]):
+        return None
     ahead = pairs.natural(j.fits[best]) and (in_radians or not pairs.natural(j.fits["as it is"]))
     if best != "as it is" and left["as it is"] < LEAST_MIRRORED and not ahead:
         return None

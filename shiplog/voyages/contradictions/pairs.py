@@ -179,8 +179,9 @@ def position_and_velocity(t: Track, moved: UnderWay) -> Joined:
 
 def heading_and_way(t: Track, moved: UnderWay) -> Iterator[Joined]:
     """The way over ground of the position, and that of a velocity over ground, against
-    ∫ |V| e^{iψ} dt. `by turns` is what the same heading leaves of a ship that goes ahead and
-    astern: on two courses at right angles, one of them astern, a mirrored heading would fit, too."""
+    ∫ |V| e^{iψ} dt. `by turns` is the share that the same heading leaves of a ship that goes
+    ahead and astern: on two courses at right angles, one of them astern, a mirrored heading fits,
+    too."""
     w, speed = moved.windows, np.abs(t.velocity)
     as_is = sailed(t, w, speed * t.ahead)
     along = np.where(np.real(t.over_ground * t.ahead.conj()) < 0.0, -speed, speed)
