@@ -31,7 +31,8 @@ FORM_ERROR = 0.02
 # Share of what a hypothesis explains, and of what a cause does. With a remainder, causes are named
 # only where they explain at least this share, which is more than the remainder does: of the
 # evidence, and of the held-out error beyond the nominal voyages'. A cause is named only where the
-# remainder could do no more than this share of what the cause does.
+# remainder could do no more than this share of what the cause does. No change is stated only where
+# the data leave at most this share of what the causes had before any data.
 MOST = 0.5
 
 # Share of what a hypothesis explains. A remainder that adds no more than this is an error of the

@@ -111,18 +111,25 @@ def test_nothing(trial):
     assert found.verdict == "undecided"
 
 
-@pytest.mark.parametrize(("hidden", "expected"), [(0, "none"), (1, "none"), (2, "undecided")])
-def test_nothing_is_not_said_where_too_much_could_not_have_shown(trial, hidden, expected):
-    """Each of the causes that were only scanned keeps 0.05 of what nothing has: 0.99/1.05 is
-    0.94, and 0.99/1.1 is 0.9 at most."""
+@pytest.mark.parametrize(
+    ("hidden", "weight", "nats", "expected"),
+    [(0, 0.0, 1.0, "none"), (1, 0.05, 1.0, "none"), (2, 0.05, 1.0, "undecided"),
+     (2, 0.05, -1.0, "none"), (2, 0.2, -1.0, "none"), (2, 0.3, -1.0, "undecided")],
+)  # fmt: skip
+def test_nothing_is_not_said_where_too_much_could_not_have_shown(
+    trial, hidden, weight, nats, expected
+):
+    """Each of the causes that were only scanned keeps a weight of what nothing has. Where the data
+    favour them, 0.98/1.05 is stated, and 0.98/1.1, with 0.89, is not. Where they do not, half of
+    what causes had may be left: 0.98/1.39 is 0.70, and 0.98/1.59 is 0.62, below two thirds."""
     made = weighed.search(trial, {((), NOMINAL): 0.98, (DRAG, NOMINAL): 0.02})
     score = made.table.found[(), NOMINAL].score
-    unseen = [c.label for c in made.table.catalogue if c.label != "drag"][:hidden]
-    for label in unseen:
-        made.scanned[label] = score + float(np.log(0.05))
+    for label in [c.label for c in made.table.catalogue if c.label != "drag"][:hidden]:
+        made.scanned[label] = score + float(np.log(weight))
+        made.table.alone[label] = nats
     found, posterior = decide(made)
     assert found.verdict == expected
-    assert posterior.none_of_all == pytest.approx(0.98 / (1.0 + 0.049 * hidden), rel=1e-3)
+    assert posterior.none_of_all == pytest.approx(0.98 / (1.0 + 0.98 * weight * hidden), rel=1e-3)
     assert found.ranking["none"] == pytest.approx(posterior.none_of_all)
 
 

@@ -8,7 +8,7 @@ h the likeliest hypothesis with these names, the first of these lines that holds
     unknown    the remainder of h is not nominal, and a kind or a name is stated; undecided where
                causes explain more than it, it is a device with 0 < P < STATED, or held-out voyages
                have refuted a cause
-    none       P(none)/(1 + Σ hidden) ≥ STATED
+    none       no change is probable enough, as `posterior` states it
     undecided  else
 
 A remainder that is a device with P ≥ STATED is named, too: the unrecorded thruster.
@@ -86,7 +86,7 @@ def decide(
             either, why = tuple(refuted), REFUTED
         else:
             verdict = "unknown"
-    elif found.none_of_all >= thresholds.STATED:
+    elif found.states_none:
         verdict = "none"
     if verdict in ("named", "unknown") and is_device:
         verdict, structure, side_force = "named", None, best.side_force

@@ -6,6 +6,15 @@ kind of remainder is, or nothing, or the verdict is undecided.
 
     p_h = exp(score_h)/Σ exp(score),   P(cause) = Σ_h p_h P_h(cause is practical)
     P(kind) = Σ_{h of that kind} p_h,  P(none) = Σ_{h nominal} p_h Π_causes (1 - P_h(practical))
+
+Causes that were only scanned have the weights w_i = exp(score_i - max)/Σ_weighed exp(score - max).
+No change is stated where P(none) is probable enough next to those that these data favour, of a log
+Bayes factor above 0 against no change, and where the data exclude at least half of what all causes
+had before any data:
+
+    P(none)/(1 + Σ_favoured w) ≥ STATED,   (1 - P)/P ≤ MOST (1 - π)/π,   P = P(none)/(1 + Σ w)
+
+with π = NO_CHANGE. The others are listed as causes that could not have shown.
 """
 
 from __future__ import annotations
@@ -46,6 +55,7 @@ class Posterior:
     one_of       names, each too improbable to be stated, one of which at least acts: that is
                  probable enough
     hidden       name → weight, relative to all these hypotheses, of causes that were only scanned
+    favoured     their part Σ w that these data favour over no change
     """
 
     hypotheses: tuple[Hypothesis, ...]
@@ -56,6 +66,7 @@ class Posterior:
     none: float
     hidden: Mapping[str, float]
     one_of: tuple[str, ...] = ()
+    favoured: float = 0.0
 
     @property
     def stated(self) -> tuple[str, ...]:
@@ -74,6 +85,16 @@ class Posterior:
         """P(none)/(1 + Σ hidden): probability that nothing changed, as the ranking has it: causes
         that these data would hardly show keep what they had before any data."""
         return self.none / (1.0 + sum(self.hidden.values()))
+
+    @property
+    def states_none(self) -> bool:
+        """Whether no change is stated, as the module says."""
+        before = (1.0 - thresholds.NO_CHANGE) / thresholds.NO_CHANGE
+        left = 1.0 - self.none_of_all
+        return (
+            self.none / (1.0 + self.favoured) >= thresholds.STATED
+            and left <= thresholds.MOST * before * self.none_of_all
+        )
 
     @property
     def remainder(self) -> str | None:
@@ -111,8 +132,8 @@ class Posterior:
 
 def posterior(search: Search) -> Posterior:
     """p_h = exp(score_h - max)/Σ exp(score - max) of the weighed hypotheses, without those that are
-    banned; P of names, kinds and none, as the module's equations; and of causes that were only
-    scanned, hidden = Σ exp(score - max)/Σ_weighed exp(score - max)."""
+    banned; P of names, kinds and none, and the weights w of causes that were only scanned, as the
+    module's equations."""
     kept = search.table.ranked()
     score = np.array([h.score for h in kept])
     share = np.exp(score - score.max())
@@ -139,16 +160,18 @@ def posterior(search: Search) -> Posterior:
     weight = float(np.exp(score - score.max()).sum())
     most = score.max() + CERTAIN_NATS
     hidden: dict[str, float] = {}
+    favoured = 0.0
     weighed = {h.causes for h in kept} | {(label,) for label in search.diverged}
     for label, one in search.scanned.items():
         if not holds_one(search.table.banned, (label,)) and (label,) not in weighed:
             name = name_of(label)
             p = float(np.exp(min(one, most) - score.max())) / weight
             hidden[name] = hidden.get(name, 0.0) + p
+            favoured += p if search.table.alone[label] > 0.0 else 0.0
     order = sorted(names, key=lambda name: -names[name])
     names = {n: names[n] for n in order}
     one_of = _alternatives(names, large_in, share)
-    return Posterior(tuple(kept), share, names, labels, kinds, none, hidden, one_of)
+    return Posterior(tuple(kept), share, names, labels, kinds, none, hidden, one_of, favoured)
 
 
 def _alternatives(
