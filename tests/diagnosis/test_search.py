@@ -81,6 +81,39 @@ def test_a_cause_is_weighed_however_far_behind_nothing_is(monkeypatch):
     assert (best.causes, best.kind) == (("drag",), NOMINAL)
 
 
+def test_a_cause_is_weighed_that_is_far_from_linear(monkeypatch):
+    """Its derivative promises a fifth of what it explains, and a remainder that explains nine
+    tenths is weighed before it: a line that drags the ship away, and a force of the place."""
+    before, scan, added = searching.weigh_remainders, evidence.scan, Search._additions
+    whole = []
+
+    def less(*given):
+        level, found = scan(*given)
+        whole.extend(one.evidence for one in found)
+        return level, [replace(one, evidence=0.2 * one.evidence) for one in found]
+
+    def absorbs(plain):
+        if plain.of.labels:
+            return before(plain)
+        nothing = made.table.nothing
+        position = replace(nothing, remainder=Remainder("position"))
+        return [replace(position, score=nothing.score + 0.9 * max(whole))]
+
+    def none_next_to_it(self, one, fit):
+        return added(self, one, fit) if one.kind == NOMINAL else []
+
+    monkeypatch.setattr(evidence, "scan", less)
+    monkeypatch.setattr(Search, "_weigh_ordinary", lambda _: None)  # raised noise explains more
+    monkeypatch.setattr(searching, "weigh_remainders", absorbs)
+    monkeypatch.setattr(Search, "_additions", none_next_to_it)
+    monkeypatch.setattr(searching, "rescored", lambda table, scale: table)
+    made = search_of(*trial_with({"drag": [4.0]}))
+    made.run()
+    best = made.table.ranked()[0]
+    assert 0.7 * max(whole) > searching.SEARCH_NATS
+    assert (best.causes, best.kind) == (("drag",), NOMINAL)
+
+
 def test_the_order_of_the_catalogue_does_not_matter(one):
     """The same data with its causes in reverse: the same hypotheses with the same probabilities."""
     other = searched({"drag": [1.2]}, causes=CAUSES[::-1])

@@ -111,7 +111,7 @@ class Search:
             ranked = self.table.ranked()
             least = ranked[0].score - SEARCH_NATS
             allowed = (s for label, s in self.scanned.items() if not self._banned((label,)))
-            promising = max(allowed, default=least) > least
+            promising = max(allowed, default=-math.inf) > self._least_promise
             near = [h for h in ranked if h.score > least or (promising and h is self.table.nothing)]
             fresh = [h for h in near if (h.causes, h.kind) not in self._expanded]
             if not fresh:
@@ -135,6 +135,16 @@ class Search:
             labels[0] for labels in self._tried
             if len(labels) == 1 and (labels, NOMINAL) not in self.table.found
         }  # fmt: skip
+
+    @property
+    def _least_promise(self) -> float:
+        """Score from which on a cause is worth a fit by itself, of what its derivative promises
+        where nothing has changed: SEARCH_NATS below the best; above nothing where the best leaves
+        something unknown. Far from linear, as the force of a line that drags the ship away, a cause
+        may explain many times what it promises."""
+        best, nothing = self.table.ranked()[0], self.table.nothing.score
+        least = best.score - SEARCH_NATS
+        return least if best.kind == NOMINAL else min(least, nothing + SEARCH_NATS)
 
     def _banned(self, labels: Sequence[str]) -> bool:
         return holds_one(self.table.banned, labels)
@@ -238,9 +248,10 @@ class Search:
         self._expanded.add((one.causes, one.kind))
         fit = self.table.fit(one)
         best = self.table.ranked()[0].score
+        alone = one is self.table.nothing
         for labels, numbers, predicted in self._additions(one, fit):
             first = not one.causes and one.score > best - SEARCH_NATS
-            worth = first or predicted > best - SEARCH_NATS
+            worth = first or predicted > (self._least_promise if alone else best - SEARCH_NATS)
             if worth and labels not in self._tried and len(self._tried) < self._most:
                 self.weigh(labels, numbers, fit.point)
         for labels, numbers in reductions(one):
