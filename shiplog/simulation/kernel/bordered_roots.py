@@ -57,7 +57,8 @@ def roots(
     of: Packed, inverse: np.ndarray, which: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
     """c - bᵀ A⁻¹ b and log|A|, each [S], of Q⁻¹ [U, n, n], the one `which` [S] of them each has, or
-    the first. Raises np.linalg.LinAlgError where a matrix is not positive definite."""
+    the first. c - bᵀ A⁻¹ b is never negative: what rounding makes so is zero. Raises
+    np.linalg.LinAlgError where an A is not positive definite."""
     kernel, n = _kernel(), of.n
     size = -(-(n + 1) // ROWS) * ROWS
     whole = np.zeros((len(inverse), size, size))
@@ -73,9 +74,10 @@ def roots(
     arrays = (of.lanes, added, each, work, diagonal)
     kernel.functions["roots"](*map(pointer, arrays), blocks, len(of.places), size // ROWS)
     found = np.moveaxis(diagonal, 2, 1).reshape(-1, size)[: of.count, : n + 1]
-    if not np.isfinite(found).all() or not (found > 0.0).all():
+    lead, last = found[:, :n], found[:, n]
+    if not (np.isfinite(lead).all() and (lead > 0.0).all()):
         raise np.linalg.LinAlgError("a matrix is not positive definite")
-    return found[:, n] ** 2, 2.0 * np.log(found[:, :n]).sum(1)
+    return np.where(np.isfinite(last), last, 0.0) ** 2, 2.0 * np.log(lead).sum(1)
 
 
 @cache
