@@ -203,6 +203,26 @@ def test_segments_on_which_the_model_runs_away_carry_no_weight(made):
     assert trial.weight[5] > 0.0
 
 
+def test_a_segment_that_only_raised_noise_keeps_is_left_out_from_the_start(made):
+    """With errors of three times what the noise allows the path of nothing follows the measurement.
+    That of the right hypothesis does not, and one segment on which it is lost refused them all."""
+    nominal, record, given = made
+    large = replace(given, e=4.0 * given.e)
+    fragile = np.arange(8) == 5
+
+    class Unstable(straight.Straight):
+        def linearise(self, numbers, near=None, noise_factor=None, remainder=None):
+            at = replace(self.given, lost=fragile) if noise_factor == 1.0 else self.given
+            again = replace(self, given=at)
+            return straight.Straight.linearise(again, numbers, near, noise_factor, remainder)
+
+    trial, point = evidence.begin(Unstable.build(nominal, record, given=large), {})
+    base, _ = evidence.scan(trial, point, (), ())
+    assert base.noise_factor > 1.5
+    assert (trial.weight > 0.0).tolist() == (~fragile).tolist()
+    trial.linearise({"drag": np.array([0.5])}, point, 1.0)  # no longer refused
+
+
 def test_a_model_that_diverges_on_every_segment_has_no_evidence(made):
     """Of nothing the prior is left, in which no cause is the most probable answer."""
     nominal, record, given = made

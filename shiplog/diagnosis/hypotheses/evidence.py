@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.linear.parameter_layout import HELD_INFORMATION
 from shiplog.diagnosis.noise import bounds
 from shiplog.diagnosis.noise.campaign_parts import robust_weights
@@ -36,7 +37,9 @@ def begin(trial: Trial, numbers: Numbers) -> tuple[Trial, Point]:
 
     The path is limited by the process noise that was estimated about the path before, until the
     evidence stays: causes must not gain by a path that converges with them. Segments on which the
-    model diverges carry no information. Raises np.linalg.LinAlgError where it diverges on all."""
+    model diverges carry no information; nor do those on which it does so where the path is limited
+    by the nominal process noise, as that of the right hypothesis will be. Raises
+    np.linalg.LinAlgError where it diverges on all."""
     first = trial.linearise(numbers)
     trial = replace(trial.leave_out(first.linear.lost), first=first)
     trial = replace(trial, weight=robust(trial, first))
@@ -46,7 +49,10 @@ def begin(trial: Trial, numbers: Numbers) -> tuple[Trial, Point]:
         if abs(base.evidence - last) < LITTLE_NATS:
             break
         point, last = trial.linearise(numbers, point, base.noise_factor), base.evidence
-    trial = trial.leave_out(point.linear.lost)
+    lost = point.linear.lost
+    if base.noise_factor > thresholds.ORDINARY_NOISE:
+        lost = lost | trial.linearise(numbers, point, 1.0).linear.lost
+    trial = trial.leave_out(lost)
     if not trial.weight.any():  # a prior without data would name nothing, as if nothing had changed
         raise np.linalg.LinAlgError("the model diverges on every segment of the trial")
     return replace(trial, begun=True), point
