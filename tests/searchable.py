@@ -7,7 +7,7 @@ import numpy as np
 import straight
 from straight import CAUSES
 
-from shiplog.diagnosis.hypotheses import evidence
+from shiplog.diagnosis.hypotheses import as_it_stands
 from shiplog.diagnosis.hypotheses.intermittent import ResidualNoise
 from shiplog.diagnosis.hypotheses.search import Search
 from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
@@ -45,7 +45,7 @@ def trial_with(hidden, causes=CAUSES, fixed=None, alike=None, **changes):
         given = replace(given, j=j)
     given = replace(given, e=given.e + given.j @ numbers_of(columns, hidden))
     trial = straight.trial(campaign, record, given, tuple(fixed or {}))
-    return evidence.begin(trial, {n: np.asarray(v) for n, v in (fixed or {}).items()})
+    return as_it_stands.begin(trial, {n: np.asarray(v) for n, v in (fixed or {}).items()})
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ from pipelines.experiments.simulated_ship import voyage as own_voyage
 from shiplog.commands.identify import identify_run
 from shiplog.commands.prepare import ingest_logs
 from shiplog.diagnosis import thresholds
-from shiplog.diagnosis.hypotheses import evidence
+from shiplog.diagnosis.hypotheses import as_it_stands, evidence
 from shiplog.diagnosis.hypotheses.evaluate import evaluate
 from shiplog.diagnosis.noise.remainder import RAISED, Remainder
 from shiplog.diagnosis.onset import onsets, stretch_information
@@ -253,7 +253,7 @@ def _label(case: Any, truth: Truth) -> str:
 def fitted(ship: Ship, record: Record, label: str) -> tuple[Trial, Fit, float]:
     """The hypothesis of this cause alone, with raised noise, and its log Bayes factor over none."""
     made = Trial.build(ship.like.campaign, record)
-    trial, point = evidence.begin(made, {})
+    trial, point = as_it_stands.begin(made, {})
     remainder = Remainder(RAISED)
     cause = next(c for c in trial.reference.model.causes if c.label == label)
     nothing, (first,) = evidence.scan(trial, point, [cause], remainder=remainder)

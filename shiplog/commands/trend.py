@@ -11,7 +11,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from shiplog.commands.bars import reach, staged
-from shiplog.diagnosis.hypotheses import evidence
+from shiplog.diagnosis.hypotheses import as_it_stands
 from shiplog.diagnosis.season import season_fit, speed_loss, trends
 from shiplog.diagnosis.trial import setup, trial_voyages
 from shiplog.diagnosis.trial.fitted import Fit
@@ -92,7 +92,7 @@ def _followed(
     if wanted:
         reach("nominal voyages")
         made = setup.trial_of(run, nominal, recorded, causes, lacking).trial
-        trial, point = evidence.begin(made, run.extension_numbers())
+        trial, point = as_it_stands.begin(made, run.extension_numbers())
         labels = season_fit.labels_of(trial, wanted)
         reach("hypotheses")
         return trial, season_fit.fitted(trial, point, labels), labels

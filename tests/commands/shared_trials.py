@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shiplog.diagnosis.hypotheses import evidence
+from shiplog.diagnosis.hypotheses import as_it_stands, evidence
 from shiplog.diagnosis.linear import segment_nodes
 from shiplog.diagnosis.noise import on_off
 from shiplog.diagnosis.noise.on_off import Course
@@ -30,7 +30,7 @@ def trial_of(run, store):
 def asked(trial):
     """Whatever a search asks of a trial, as one list of arrays: paths, weights, evidence, products
     with and without a voyage, residuals."""
-    trial, point = evidence.begin(trial, {})
+    trial, point = as_it_stands.begin(trial, {})
     found = [point.path.start, point.path.acceleration, trial.weight, point.linear.lost]
     near = trial.linearise(CURRENT, point, 1.3)
     again = trial.linearise(CURRENT, near.path, 1.3, RAISES)

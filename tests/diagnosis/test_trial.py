@@ -10,7 +10,7 @@ import straight
 from dense_trial import DRAG, SHARE, gaussian, level, nats, of_noise
 from straight import PROCESS_NOISE
 
-from shiplog.diagnosis.hypotheses import evidence, fits
+from shiplog.diagnosis.hypotheses import as_it_stands, evidence, fits
 from shiplog.diagnosis.linear.parameter_layout import HELD_INFORMATION
 from shiplog.diagnosis.noise import bounds, campaign_parts
 from shiplog.diagnosis.noise.remainder import NOMINAL, Remainder
@@ -127,7 +127,7 @@ def test_a_few_segments_do_not_decide(made):
     spoilt = given.e.copy()
     spoilt[3] += 40.0 * straight.NOISE * np.random.default_rng(1).standard_normal((15, 6))
     trial = straight.trial(nominal, record, replace(given, e=spoilt))
-    weight = evidence.robust(trial, trial.linearise({}))
+    weight = as_it_stands.robust(trial, trial.linearise({}))
     assert weight[3] < 0.05
     assert (np.delete(weight, 3) > 0.9).all()
 
@@ -147,7 +147,7 @@ def test_the_distance_of_a_segment_is_the_dense_one(made, monkeypatch):
         chi2.append(r @ np.linalg.solve(c, r))
     wanted = np.minimum(1.0, 1.5 * np.median(chi2) / np.array(chi2))
     monkeypatch.setattr(campaign_parts, "ROBUST", 1.5)
-    assert evidence.robust(trial, point) == pytest.approx(wanted, rel=1e-5)
+    assert as_it_stands.robust(trial, point) == pytest.approx(wanted, rel=1e-5)
 
 
 def test_products_of_a_point_that_is_gone_are_not_taken_for_anothers(trial):
@@ -193,7 +193,7 @@ def test_segments_on_which_the_model_runs_away_carry_no_weight(made):
     lost[2] = True
     nominal, record, given = made
     away = replace(given, lost=lost)
-    trial, point = evidence.begin(straight.Straight.build(nominal, record, given=away), {})
+    trial, point = as_it_stands.begin(straight.Straight.build(nominal, record, given=away), {})
     assert (trial.weight > 0.0).tolist() == (~lost).tolist()
     assert trial.begun and point.linear.lost.tolist() == lost.tolist()
     trial.linearise({"drag": np.array([0.1])})  # the same one again is no failure
@@ -216,7 +216,7 @@ def test_a_segment_that_only_raised_noise_keeps_is_left_out_from_the_start(made)
             again = replace(self, given=at)
             return straight.Straight.linearise(again, numbers, near, noise_factor, remainder)
 
-    trial, point = evidence.begin(Unstable.build(nominal, record, given=large), {})
+    trial, point = as_it_stands.begin(Unstable.build(nominal, record, given=large), {})
     base, _ = evidence.scan(trial, point, (), ())
     assert base.noise_factor > 1.5
     assert (trial.weight > 0.0).tolist() == (~fragile).tolist()
@@ -228,7 +228,7 @@ def test_a_model_that_diverges_on_every_segment_has_no_evidence(made):
     nominal, record, given = made
     lost = replace(given, lost=np.ones(8, dtype=bool))
     with pytest.raises(np.linalg.LinAlgError, match="every segment"):
-        evidence.begin(straight.Straight.build(nominal, record, given=lost), {})
+        as_it_stands.begin(straight.Straight.build(nominal, record, given=lost), {})
 
 
 def test_the_model_as_it_stands_is_linearised_until_its_evidence_stays(made):
@@ -242,10 +242,10 @@ def test_the_model_as_it_stands_is_linearised_until_its_evidence_stays(made):
             off = given.e + asked[-1] * np.sin(np.arange(given.e.size)).reshape(given.e.shape)
             return straight.Straight.linearise(replace(self, given=replace(given, e=off)), *more)
 
-    trial, point = evidence.begin(Closing.build(nominal, record, given=given), {})
+    trial, point = as_it_stands.begin(Closing.build(nominal, record, given=given), {})
     at_end, _ = evidence.scan(trial, point, (), ())
     closest, _ = evidence.scan(trial, straight.Straight.linearise(trial, {}), (), ())
-    assert 3 < len(asked) < evidence.MOST_PATHS
+    assert 3 < len(asked) < as_it_stands.MOST_PATHS
     assert at_end.evidence == pytest.approx(closest.evidence, abs=evidence.LITTLE_NATS)
 
 

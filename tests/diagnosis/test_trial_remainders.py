@@ -11,7 +11,7 @@ from scipy.stats import multivariate_normal, norm
 from searchable import search_of
 from straight import CAUSES, PROCESS_NOISE
 
-from shiplog.diagnosis.hypotheses import evidence, fits, weighing
+from shiplog.diagnosis.hypotheses import as_it_stands, evidence, fits, weighing
 from shiplog.diagnosis.noise import remainder
 from shiplog.diagnosis.noise.discrepancy import EVEN
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
@@ -184,7 +184,7 @@ def test_a_fit_that_diverges_with_raised_noise_leaves_no_noise_to_explain(
 ):
     """The first or the second fit of a set diverges, with numbers that are not finite: neither a
     factor of each channel nor a force is asked of it, and the set stays with raised noise."""
-    trial, point = evidence.begin(straight.trial(*made), {})
+    trial, point = as_it_stands.begin(straight.trial(*made), {})
     real, count = weighing.resume, 0
     monkeypatch.setattr(weighing, "RAISED_FROM", 0.0)
 

@@ -16,7 +16,7 @@ from whole_way import PROFILE, apart, labels, truth
 import shiplog
 from shiplog.commands import diagnose as pipeline
 from shiplog.commands.prepare import ingest_logs
-from shiplog.diagnosis.hypotheses import evidence
+from shiplog.diagnosis.hypotheses import as_it_stands, evidence
 from shiplog.diagnosis.hypotheses.evaluate import resume
 from shiplog.diagnosis.noise.remainder import Remainder
 from shiplog.diagnosis.residual import next_manoeuvre
@@ -164,7 +164,7 @@ def test_two_rudders_exchanged_are_told_by_the_evidence_of_both_orders(sea):
     known = {one.cause.label: one.numbers for one in sea.done.decision.named}
 
     def gained(observed):
-        trial, at = evidence.begin(Trial.build(campaign, observed, [*known]), known)
+        trial, at = as_it_stands.begin(Trial.build(campaign, observed, [*known]), known)
         return exchanged_twins.gain(trial, at, known, pair)
 
     lost = gained(record)
@@ -260,7 +260,7 @@ def test_causes_converge_from_where_they_converged_before(compass):
             asked.append(numbers)
             return super().linearise(numbers, *given)
 
-    again, point = evidence.begin(Counted.build(trial.campaign, trial.record), {})
+    again, point = as_it_stands.begin(Counted.build(trial.campaign, trial.record), {})
     asked.clear()
     ends = []
     for begin in (0.5, -0.5):

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from pipelines.experiments.simulated_ship import Laws, cases, sensors
-from shiplog.diagnosis.hypotheses import evidence, search
+from shiplog.diagnosis.hypotheses import as_it_stands, search
 from shiplog.diagnosis.nominal import placebo
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.diagnosis.verdict.decide import decide
@@ -53,7 +53,7 @@ def judged(campaign, observed, sets=2):
 
     sets  of causes that are searched: here one cause acts at most, found when each is tried alone
     """
-    trial, point = evidence.begin(Trial.build(campaign, observed), {})
+    trial, point = as_it_stands.begin(Trial.build(campaign, observed), {})
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(search, "MOST_SETS", sets)
         found = search.Search(trial, point, placebo.placebos(campaign))

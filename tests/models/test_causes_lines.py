@@ -8,8 +8,9 @@ import pytest
 from cause_ships import BY, CALM, PLACES, TWIN, forces, setting
 
 from shiplog.models.causes import CATALOGUE
+from shiplog.models.causes.contact import Contact
 from shiplog.models.causes.environment import to_wall
-from shiplog.models.causes.lines import Contact, Line, Tow
+from shiplog.models.causes.lines import Line, Tow
 
 OFF = ("propeller", "rudder", "wind")
 LINE = BY["line"].on(setting())

@@ -26,7 +26,7 @@ from pathlib import Path
 import numpy as np
 from scipy.special import chdtri  # scipy.stats takes a second to load
 
-from shiplog.diagnosis.hypotheses import evidence
+from shiplog.diagnosis.hypotheses import as_it_stands, evidence
 from shiplog.diagnosis.linear import measurement_correction, segments
 from shiplog.diagnosis.linear.linear_segments import Linear
 from shiplog.diagnosis.linear.parameter_layout import Columns
@@ -88,7 +88,7 @@ def answers(run_path: Path, store: Store, voyages: Sequence[str]) -> dict[str, R
         for some in (trained, names)
     )
     trial = trial_of(run, usual, recorded, ()).trial
-    trial, point = evidence.begin(trial, run.extension_numbers())
+    trial, point = as_it_stands.begin(trial, run.extension_numbers())
     fitted = run.base()[1].values
     return {
         "regression": regression(trial, fitted, usual),

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shiplog.diagnosis.hypotheses import evidence
+from shiplog.diagnosis.hypotheses import as_it_stands, evidence
 from shiplog.diagnosis.trial.fitted import Point
 from shiplog.diagnosis.trial.trial import Numbers, Trial
 from shiplog.diagnosis.verdict.result import Decision
@@ -61,7 +61,7 @@ def gain(trial: Trial, point: Point, numbers: Numbers, pair: tuple[Actuator, Act
     as_read, _ = evidence.scan(trial, point, (), trial.fixed)
     other = Trial.build(trial.campaign, replace(record, actuator=actuator), trial.fixed)
     try:
-        other, at = evidence.begin(other, numbers)
+        other, at = as_it_stands.begin(other, numbers)
     except np.linalg.LinAlgError:
         return -np.inf
     if at.linear.lost[trial.weight > 0.0].any():

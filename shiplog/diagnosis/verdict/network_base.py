@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from shiplog.diagnosis.hypotheses import evidence
+from shiplog.diagnosis.hypotheses import as_it_stands, evidence
 from shiplog.diagnosis.noise.remainder import RAISED, Remainder
 from shiplog.diagnosis.nominal import nominal_campaign, nominal_reference
 from shiplog.diagnosis.trial.fitted import Fit
@@ -47,7 +47,7 @@ class Own:
             nominal_reference.with_causes(self.reference, causes)
         )
         trial = Trial.build(campaign, self.judge.record, [c.label for c in causes])
-        trial, first = evidence.begin(trial, self.numbers)
+        trial, first = as_it_stands.begin(trial, self.numbers)
         trial = trial.leave_out(self.judge.weight == 0.0)
 
         def fitted(point, included) -> Fit:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shiplog.diagnosis.decision_parts import ALL, Parts
-from shiplog.diagnosis.hypotheses import evidence
+from shiplog.diagnosis.hypotheses import as_it_stands
 from shiplog.diagnosis.hypotheses.search import Search
 from shiplog.diagnosis.nominal import placebo
 from shiplog.diagnosis.trial import setup, trial_voyages
@@ -124,7 +124,7 @@ def _searched(
     likely: Mapping[str, np.ndarray] | None, nearer: bool,
 ) -> _Searched:  # fmt: skip
     memory.give_back()  # what the nominal campaign took
-    trial, point = evidence.begin(made.trial, run.extension_numbers())
+    trial, point = as_it_stands.begin(made.trial, run.extension_numbers())
     log.info(
         "%s against %s: %d segments of %d s, of which a share of %.2f counts",
         listed(trial.record.names, most=4), run.name, len(trial.rows), trial.grid.seconds,

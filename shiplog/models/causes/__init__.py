@@ -21,8 +21,9 @@ from shiplog.models.causes.base import (
     constants_of,
     si,
 )
+from shiplog.models.causes.contact import Contact
 from shiplog.models.causes.environment import Bank, Current, ShallowWater, WindForce
-from shiplog.models.causes.lines import Contact, Line, Tow
+from shiplog.models.causes.lines import Line, Tow
 from shiplog.models.causes.sensors import (
     AntennaOffset,
     ClockOffset,
