@@ -140,11 +140,12 @@ class Search:
     def _least_promise(self) -> float:
         """Score from which on a cause is worth a fit by itself, of what its derivative promises
         where nothing has changed: SEARCH_NATS below the best; above nothing where the best leaves
-        something unknown. Far from linear, as the force of a line that drags the ship away, a cause
-        may explain many times what it promises."""
+        something unknown, or has no cause and raised noise. Far from linear, as the force of a line
+        that drags the ship away, a cause may explain many times what it promises."""
         best, nothing = self.table.ranked()[0], self.table.nothing.score
         least = best.score - SEARCH_NATS
-        return least if best.kind == NOMINAL else min(least, nothing + SEARCH_NATS)
+        explained = best.kind == NOMINAL or (best.kind == RAISED and best.causes)
+        return least if explained else min(least, nothing + SEARCH_NATS)
 
     def _banned(self, labels: Sequence[str]) -> bool:
         return holds_one(self.table.banned, labels)
