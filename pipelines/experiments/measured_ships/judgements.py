@@ -23,8 +23,9 @@ JUDGEMENTS: dict[str, str] = {
         "predicts zigzags better than the physics, and `evaluate` says so."
     ),
     "kvlcc2, full scale": (
-        "Believable. All six tests are of one series: no change is the most probable answer, and "
-        "has less than 90 %."
+        "Believable. All six tests are of one series, and nothing is known to have changed. The "
+        "probability of no change is 0.84: what is left is spread over causes that these tests do "
+        "not favour, and do not exclude."
     ),
     "blueboat": (
         "Believable as far as it goes. Sixteen runs of one afternoon, two thirds of them with "
