@@ -8,7 +8,7 @@ as it likes, and the same messages give the same events.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -181,7 +181,7 @@ class Watch:
             if not alarm.again:
                 began = [one.began for one in alarm.suspects[:1]]
                 self.alarmed = min([*began, segment.start])
-            yield alarm
+            yield replace(alarm, voyage=self.rows.anchor)
 
     def finish(self, clock: int) -> Iterator[Event]:
         """All that came is final, once the source is closed."""
@@ -253,7 +253,7 @@ class Watch:
             self.segments.begin = begin
         self.resume_after = int(facts.get("done") or 0)
         self.alarmed = None if facts.get("alarmed") is None else int(facts["alarmed"])
-        if facts.get("anchor"):
+        if facts.get("anchor") is not None:
             self.rows.anchor = int(facts["anchor"])
             datum = facts.get("datum")
             self.rows.datum = None if datum is None else (float(datum[0]), float(datum[1]))
