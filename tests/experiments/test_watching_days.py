@@ -66,7 +66,7 @@ def test_voyages_with_a_beginning_are_drawn_alike_whichever_ships_are_there(tmp_
     """Only of causes in the ship's bank, in sizes of 0.25 to 1; and `rates` reads what is kept."""
     bank = [Made(name=name) for name in ("current", "fouling", "payload", "no such cause")]
     of: Any = Made(campaign=Made(reference=Made(model=Made(causes=bank))), grid=Made(seconds=30.0))
-    everyone = segments_kept.half_ways(dict.fromkeys(sailing.FIVE, of), 25, 1000)
+    everyone = segments_kept.half_ways({s: of for s in sailing.FIVE}, 25, 1000)
     assert {one.cause for one in everyone} == {"current", "fouling", "payload"}
     assert all(0.25 <= one.size <= 1.0 for one in everyone)
     home1 = segments_kept.half_ways({sailing.FIVE[0]: of}, 25, 1000)
