@@ -56,7 +56,7 @@ def test_a_slope_of_memory_is_that_of_a_regression_by_scipy():
     memory = 290.0 + 2.5 / 24.0 * at + np.random.default_rng(3).normal(0.0, 0.1, 30)
     memory[:10] -= 40.0  # it fills at first
     found, low, high = days.slope(at, memory)
-    scipys = linregress(at[10:] / 24.0, memory[10:])
+    scipys: Any = linregress(at[10:] / 24.0, memory[10:])
     assert found == pytest.approx(scipys.slope)
     assert (high - low) / 2.0 == pytest.approx(1.7341 * scipys.stderr, rel=1e-4)  # t of 18, 95 %
     assert np.isnan(days.slope(at[:4], memory[:4])[0])
