@@ -62,6 +62,15 @@ def test_a_slope_of_memory_is_that_of_a_regression_by_scipy():
     assert np.isnan(days.slope(at[:4], memory[:4])[0])
 
 
+def test_memory_that_rises_and_falls_with_each_voyage_is_judged_by_its_highest_lines():
+    """Voyages of four hours, a line just after each hour; the last one, cut short, has no next."""
+    at = np.arange(1.0, 12.0) * 1.001
+    memory = np.array([9.0, 8.0, 7.0, 6.0, 9.5, 8.0, 7.0, 6.0, 10.0, 5.0, 4.0])
+    hours, most = days.highest(at, memory)
+    assert most.tolist() == [9.0, 9.5]
+    assert hours.tolist() == at[[0, 4]].tolist()
+
+
 def test_voyages_with_a_beginning_are_drawn_alike_whichever_ships_are_there(tmp_path):
     """Only of causes in the ship's bank, in sizes of 0.25 to 1; and `rates` reads what is kept."""
     bank = [Made(name=name) for name in ("current", "fouling", "payload", "no such cause")]
