@@ -165,7 +165,13 @@ class Watch:
             yield from self._segments(rows, end)
 
     def _missing(self, time: int) -> Iterator[Event]:
-        """Topics of the profile that the source does not have."""
+        """Topics of the profile that the source does not have, and a log of another ship."""
+        own, named = self.run.profile.ship.name, self.window.metadata.get("voyage", {}).get("ship")
+        if named and named != own:
+            yield from self.health.once(
+                "source", "ship",
+                f"{self.source.name} names its ship {named!r}, and the run is of {own!r}.", time,
+            )  # fmt: skip
         for topic in sorted(set(self.run.profile.wanted()) - self.window.topics):
             there = listed(sorted(self.window.topics))
             yield from self.health.once(
