@@ -45,6 +45,7 @@ class Alarm:
     statistic, threshold   in nats
     suspects               the most probable first; none of what no cause explains
     again                  the alarm stood already, with another suspect
+    voyage                 ns, the first row of its voyage; None where a watch did not say
     """
 
     time: int
@@ -53,6 +54,7 @@ class Alarm:
     suspects: tuple[Suspect, ...]
     unexplained: bool
     again: bool
+    voyage: int | None = None
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,10 @@ from shiplog.live.error_now import Point
 from shiplog.live.health import Notice
 from shiplog.nomenclature.units import SECOND_NS
 
+# ns, 1990-01-01. No recorder is older: stamps before it count from 1970, or from when the recorder
+# was switched on, and say nothing as a date.
+DATED_FROM = 631_152_000 * SECOND_NS
+
 
 @dataclass(frozen=True)
 class RowsCame:
@@ -94,9 +98,19 @@ def sentence(alarm: Alarm) -> str:
     near = [o.name for o in others if o.log_factor > 0.5 * first.log_factor > 0.0]
     also = f", or {' or '.join(near)}" if near else ""
     return (
-        f"{again} ship differs from its model since about {clock(first.began)}. Suspected: "
-        f"{first.name}{also}. A suspicion, not a verdict."
+        f"{again} ship differs from its model since about {since(first.began, alarm.voyage)}. "
+        f"Suspected: {first.name}{also}. A suspicion, not a verdict."
     )
+
+
+def since(time: int, voyage: int | None) -> str:
+    """A time [ns] in words: UTC, or the second of the voyage that began at `voyage` where the
+    stamps are no date."""
+    if time >= DATED_FROM:
+        return clock(time)
+    if voyage is not None:
+        return f"{(time - voyage) / SECOND_NS:.0f} s into the voyage"
+    return f"{time / SECOND_NS:.1f} s of the recorder's clock"
 
 
 def _digits(value: float | None) -> float | None:

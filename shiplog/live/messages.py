@@ -25,7 +25,7 @@ class Window:
 
     topics    all that a message or a description named so far
     metadata  records of the log, such as "voyage"
-    newest    ns, the latest log time but for those that `future` leaves out; 0 before the first
+    newest    ns, the latest log time; 0 before the first
     """
 
     seconds: float

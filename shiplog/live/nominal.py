@@ -16,6 +16,7 @@ from shiplog.diagnosis.linear.segments import SegmentGrid
 from shiplog.diagnosis.nominal import nominal_cache, nominal_campaign
 from shiplog.diagnosis.nominal.nominal_campaign import Campaign
 from shiplog.diagnosis.trial import trial_voyages
+from shiplog.live import left_out
 from shiplog.models import causes as catalogue
 from shiplog.models.causes import Setting
 from shiplog.models.extended import Extended
@@ -79,7 +80,8 @@ def nominal(run: Run, store: Store) -> Nominal | None:
     setting, plain, model, start = _models(run, scaled)
     at = nominal_cache.converged(plain, setting, start, scaled)
     found = nominal_cache.characteristics(plain, setting, start, scaled, at)
-    return Nominal(scaled, nominal_campaign.learn(model, setting, start, scaled, at, found))
+    learned = nominal_campaign.learn(model, setting, start, scaled, at, found)
+    return Nominal(scaled, left_out.in_common(learned, scaled.voyage[segments.begins(scaled)]))
 
 
 def is_kept(run: Run, store: Store) -> bool:

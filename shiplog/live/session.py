@@ -7,8 +7,8 @@ as it likes, and the same messages give the same events.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Generator, Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,7 @@ from shiplog.live import evidence_file, kept, kept_voyage, messages
 from shiplog.live.alarm import Alarm, Watcher
 from shiplog.live.calibration import Calibration
 from shiplog.live.causal_rows import CausalRows, Rows
+from shiplog.live.clock_steps import ClockSteps
 from shiplog.live.error_now import ErrorNow
 from shiplog.live.events import Event, RowsCame, SegmentDone
 from shiplog.live.finished_segments import FinishedSegments, Segment
@@ -50,6 +51,7 @@ class Watch:
     out: Path | None = None
     window: Window = field(default_factory=lambda: Window(90.0))
     inflow: Inflow = field(default_factory=Inflow)
+    steps: ClockSteps = field(default_factory=ClockSteps)
     health: Health = field(default_factory=Health)
     rows: CausalRows = field(init=False)
     errors: ErrorNow = field(init=False)
@@ -97,10 +99,12 @@ class Watch:
         for note in arrived.notes:
             yield from self.health.once("source", "source", note, clock)
         if arrived.anew:
+            self.steps = ClockSteps()
             yield from self._begin_anew()
         self.window.metadata = {k: dict(v) for k, v in arrived.metadata.items()}
         self.window.topics |= arrived.topics
-        self.inflow.add(arrived.frames)
+        frames = yield from self._ordered(arrived.frames, clock)
+        self.inflow.add(frames)
         if arrived.count:
             self.last_arrival = clock
         if self.last_arrival is None:
@@ -108,8 +112,26 @@ class Watch:
         self.ended = arrived.ended
         if not arrived.ended:
             yield from self.health.arrivals(self.last_arrival, clock, self.source.name)
-        if newest := messages.newest(arrived.frames):
+        if newest := messages.newest(frames):
             yield from self.health.clock(newest, clock, self.source.live)
+
+    def _ordered(self, frames: Frames, clock: int) -> Generator[Event, None, Frames]:
+        """Those of the messages whose log time can be one."""
+        found = self.steps.order(frames, self.window.parts)
+        for topic, ahead in found.left_out.items():
+            yield from self.health.once(
+                "clock", topic,
+                f"A message of {topic} is logged {ahead:.0f} s ahead of those before and after it: "
+                "it is left out.", clock,
+            )  # fmt: skip
+        if found.back_s:
+            yield from self.health.once(
+                "clock", "back",
+                f"The recorder's clock was set back by {found.back_s:.0f} s: another voyage "
+                "begins.", clock,
+            )  # fmt: skip
+            yield from self._begin_anew()
+        return found.frames
 
     def _take(self, frames: Frames) -> Iterator[Event]:
         oldest = messages.oldest(frames)
@@ -143,7 +165,13 @@ class Watch:
             yield from self._segments(rows, end)
 
     def _missing(self, time: int) -> Iterator[Event]:
-        """Topics of the profile that the source does not have."""
+        """Topics of the profile that the source does not have, and a log of another ship."""
+        own, named = self.run.profile.ship.name, self.window.metadata.get("voyage", {}).get("ship")
+        if named and named != own:
+            yield from self.health.once(
+                "source", "ship",
+                f"{self.source.name} names its ship {named!r}, and the run is of {own!r}.", time,
+            )  # fmt: skip
         for topic in sorted(set(self.run.profile.wanted()) - self.window.topics):
             there = listed(sorted(self.window.topics))
             yield from self.health.once(
@@ -181,7 +209,7 @@ class Watch:
             if not alarm.again:
                 began = [one.began for one in alarm.suspects[:1]]
                 self.alarmed = min([*began, segment.start])
-            yield alarm
+            yield replace(alarm, voyage=self.rows.anchor)
 
     def finish(self, clock: int) -> Iterator[Event]:
         """All that came is final, once the source is closed."""
@@ -253,7 +281,7 @@ class Watch:
             self.segments.begin = begin
         self.resume_after = int(facts.get("done") or 0)
         self.alarmed = None if facts.get("alarmed") is None else int(facts["alarmed"])
-        if facts.get("anchor"):
+        if facts.get("anchor") is not None:
             self.rows.anchor = int(facts["anchor"])
             datum = facts.get("datum")
             self.rows.datum = None if datum is None else (float(datum[0]), float(datum[1]))

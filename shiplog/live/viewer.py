@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 import tempfile
 import webbrowser
+from subprocess import Popen
 from typing import IO
 from urllib.parse import quote
 
@@ -35,10 +36,16 @@ MEASURED, SIMULATED = colours.TEXT, (0x1F, 0x77, 0xB4)
 
 
 class LiveView:
-    """Events of one watch as a Rerun recording; `recording` is where they are sent."""
+    """Events of one watch as a Rerun recording.
 
-    def __init__(self, recording: rr.RecordingStream, title: str) -> None:
-        self.recording = recording
+    recording   where they are sent
+    process     the viewer, which ends when nobody holds it any more; None of a file
+    """
+
+    def __init__(
+        self, recording: rr.RecordingStream, title: str, process: Popen[bytes] | None = None
+    ) -> None:
+        self.recording, self.process = recording, process
         self._measured: list[tuple[float, float]] = []
         self._simulated: list[tuple[float, float]] = []
         recording.send_recording_name(title)
@@ -119,8 +126,9 @@ def opened(title: str, web: bool) -> LiveView:
         recording.connect_grpc(address)
     except (TimeoutError, RuntimeError) as error:
         raise native.not_started(output) from error
+    output.close()  # the viewer writes on: only its last words before a failure are read
     if web:
         url = f"http://{native.HOST}:{page}/?url={quote(address, safe=':/')}"
         log.warning("the watch is shown at %s", url)
         webbrowser.open(url)
-    return LiveView(recording, title)
+    return LiveView(recording, title, process)

@@ -99,12 +99,16 @@ def headings(first: int, seconds: int) -> pl.DataFrame:
 @pytest.mark.long
 def test_a_source_without_a_channel_is_told_and_watched_on(published):
     run = load_model.load(published[0])
-    looks = [Arrived({"/gyro": headings(DAY + n * 10 * 10**9, 10)}, topics=frozenset({"/gyro"}))
-             for n in range(4)]  # fmt: skip
+    of = {"voyage": {"ship": "another ship"}}
+    looks = [
+        Arrived({"/gyro": headings(DAY + n * 10 * 10**9, 10)}, (), of, frozenset({"/gyro"}))
+        for n in range(4)
+    ]
     watch = Watch(run, Given(looks))
     events = [e for step in range(40) for e in watch.step(DAY + step * 10**9)]
     sentences = [e.sentence for e in events if hasattr(e, "sentence")]
     assert any("/gnss/fix" in s and "/gyro" in s for s in sentences)
+    assert any("'another ship'" in s and run.profile.ship.name in s for s in sentences)
     assert len(sentences) == len(set(sentences))  # each once, however long it lasts
     quiet = [e for step in range(4, 30) for e in watch.step(DAY + (100 + step) * 10**9)]
     assert any("given is silent" in getattr(e, "sentence", "") for e in [*events, *quiet])

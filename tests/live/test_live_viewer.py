@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import psutil
+import pytest
 import rerun as rr
 from rerun.chunk import RrdReader
 
+from shiplog.live import viewer
 from shiplog.live.alarm import Alarm, Suspect
 from shiplog.live.error_now import Point
 from shiplog.live.events import SegmentDone, as_json
@@ -48,3 +51,26 @@ def test_an_alarm_calls_itself_a_suspicion():
     assert line["suspects"][0] == {
         "name": "current", "log_factor": 9.5, "began": "2026-05-28T20:26:40.0Z",
     }  # fmt: skip
+
+
+@pytest.mark.viewer
+def test_the_page_of_a_watch_is_served_to_this_machine_only(monkeypatch):
+    """By the kernel's own table of who listens, as `ss -ltn` prints it."""
+    shown: list[str] = []
+    monkeypatch.setattr(viewer.webbrowser, "open", shown.append)
+    view = viewer.opened("a run, watched", web=True)
+    process = view.process
+    assert process is not None and process.stdin is not None
+    server = psutil.Process(process.pid)
+    try:
+        view(point(1))
+        view.recording.flush()
+        everyone = (psutil.Process(), server, *server.children(recursive=True))
+        found = [c.laddr for one in everyone for c in one.net_connections("inet")
+                 if c.status == psutil.CONN_LISTEN]  # fmt: skip
+        assert len(found) >= 2 and {address.ip for address in found} == {"127.0.0.1"}
+        assert shown[0].startswith("http://127.0.0.1:")
+    finally:
+        view.recording.disconnect()
+        process.stdin.close()  # the viewer ends with it
+        process.wait(20.0)

@@ -6,8 +6,11 @@ SHIPS is the folder of `ships`. Voyages of four hours, half an hour apart, are s
 process, which hands their messages over half an hour at a time; the watch takes them as
 `shiplog watch` does, with alarm and kept rows. A line after each hour of rows: the memory of the
 process. At the end the slope of a straight line through the later two thirds [MB a day of sailing],
-with an interval of 90 % by the scatter about it. A line an hour is printed as it comes, so that a
-run that was stopped has its figure, too: --report FILE reads what was printed.
+with an interval of 90 % by the scatter about it: of all lines, and of the highest line of each
+voyage but the last. The source holds what the watch has not yet taken of a voyage, and the next
+one: memory rises and falls with each voyage, and after the last one nothing follows. A line an hour
+is printed as it comes, so that a run that was stopped has its figure, too: --report FILE reads what
+was printed.
 """
 
 from __future__ import annotations
@@ -124,6 +127,22 @@ def slope(at_h: np.ndarray, memory: np.ndarray) -> tuple[float, float, float]:
     return found, found - wide, found + wide
 
 
+def highest(at_h: np.ndarray, memory: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The line of most memory of each voyage but the last."""
+    voyage = np.ceil(np.round(at_h * 3600.0 / VOYAGE_S, 2) - 0.1)
+    chosen = [
+        np.flatnonzero(voyage == v)[memory[voyage == v].argmax()] for v in np.unique(voyage)[:-1]
+    ]
+    return at_h[chosen], memory[chosen]
+
+
+def in_words(at_h: np.ndarray, memory: np.ndarray) -> str:
+    """Both slopes."""
+    line = "{:.2f} MB a day ({:.2f} to {:.2f})"
+    return (f"{line.format(*slope(at_h, memory))}; of the highest of each voyage but the last "
+            f"{line.format(*slope(*highest(at_h, memory)))}")  # fmt: skip
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("ships", type=Path)
@@ -134,7 +153,7 @@ def main() -> None:
     if given.report:
         lines = [line.split()[:2] for line in given.report.read_text().splitlines()
                  if line[:1].isdigit()]  # fmt: skip
-        print("{:.2f} MB a day ({:.2f} to {:.2f})".format(*slope(*np.array(lines, float).T)))
+        print(in_words(*np.array(lines, float).T))
         return
     (ship,) = (s for s in sailing.SHIPS if s.name == given.ship)
     folder = given.ships / ship.name
@@ -150,7 +169,7 @@ def main() -> None:
             found.append((at, memory))
             print(f"{at:.2f} {memory:.1f} MB, {time.process_time():.0f} s of processor", flush=True)
         source.close()
-    print("{:.2f} MB a day ({:.2f} to {:.2f})".format(*slope(*np.array(found).T)))
+    print(in_words(*np.array(found).T))
 
 
 if __name__ == "__main__":

@@ -36,8 +36,9 @@ TITLE = """# Recorded voyages, watched
 
 Voyages of the 3 m Esso Osaka (`frt-ds-esso`) replayed as if they were sailed now, each from its
 first message on. What the watch says stands next to what `ingest` says of the same log, and
-`diagnose` of all of them. No truth is assumed. A value that repeats for less than three seconds is
-reported by `ingest` alone, and so are clocks and scales, which need a whole log.
+`diagnose` of all of them with the published coefficients. No truth is assumed. A value that repeats
+for less than three seconds is reported by `ingest` alone, and so are clocks and scales, which need
+a whole log.
 Written by `python -m pipelines.experiments.watching.replayed RUN STORE LOGS OUT.jsonl --report`.
 """
 

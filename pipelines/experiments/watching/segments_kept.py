@@ -10,8 +10,9 @@ SHIPS holds a folder a ship with `store` and `base`, as `hidden_effects` makes t
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from shiplog.diagnosis.linear import segments
 from shiplog.live import calibration, nominal, segment_products
 from shiplog.live.alarm import places
 from shiplog.live.nominal import Nominal
+from shiplog.logs.conversion.write import Series
 from shiplog.machine import files
 from shiplog.training.runs import load_model
 from shiplog.voyages.rows.recording import Record
@@ -61,12 +63,35 @@ def keep_calibrations(there: dict[sailing.Ship, Nominal], maps: dict, out: Path)
         )  # fmt: skip
 
 
-def half_ways(
-    there: dict[sailing.Ship, Nominal], count: int, first: int
-) -> list[tuple[sailing.Ship, str]]:
-    """Ship and cause of so many voyages, drawn of the causes of its bank; `first`, of their
-    numbers, is part of the seed."""
-    rng = np.random.default_rng([68, first])
+@dataclass(frozen=True)
+class HalfWay:
+    """A voyage in whose middle a cause begins. size: of its realistic one."""
+
+    number: int
+    ship: sailing.Ship
+    cause: str
+    size: float
+
+    def seconds(self, of: Nominal) -> float:
+        """How long it lasts: a ship with longer segments sails longer."""
+        return sailing.LEG_S * max(1.0, of.grid.seconds / 30.0)
+
+    def series(self, seconds: float) -> tuple[list[Series], float]:
+        """Its messages, and when it begins [s]."""
+        return sailing.half_way(self.ship, 5000 + self.number, self.cause, self.size, seconds)
+
+    def write(self, stream: IO[bytes], H: np.ndarray, times: np.ndarray, begins: float) -> None:
+        """H_s, the ends of its segments, and the answer."""
+        np.savez(
+            stream, H=H.astype(np.float32), times=times, begins=begins, size=self.size,
+            cause=np.array(self.cause), ship=np.array(self.ship.name),
+        )  # fmt: skip
+
+
+def half_ways(there: dict[sailing.Ship, Nominal], count: int, first: int) -> list[HalfWay]:
+    """So many voyages of the ships that are there; causes are drawn of the ship's bank, sizes of
+    0.25 to 1 of the realistic one. `first`, of their numbers, is part of the seeds."""
+    rng, sizes = np.random.default_rng([68, first]), np.random.default_rng([69, first])
     found = []
     for number in range(count):
         ship = sailing.FIVE[number % len(sailing.FIVE)]
@@ -74,7 +99,9 @@ def half_ways(
         if ship in there:
             known = {c.name for c in there[ship].campaign.reference.model.causes}
             offered = [name for name in offered if name in known]
-        found.append((ship, str(rng.choice(offered))))
+        cause, size = str(rng.choice(offered)), float(0.25 ** sizes.uniform(0.0, 1.0))
+        if ship in there:
+            found.append(HalfWay(first + number, ship, cause, size))
     return found
 
 
@@ -82,22 +109,16 @@ def keep_half_ways(
     there: dict[sailing.Ship, Nominal], maps: dict, out: Path, count: int, first: int
 ) -> None:
     """H_s of each such voyage, the ends of its segments, and what was hidden from when on."""
-    rng = np.random.default_rng([69, first])
-    for number, (ship, cause) in enumerate(half_ways(there, count, first), first):
-        size = float(0.25 ** rng.uniform(0.0, 1.0))  # of the realistic size, 0.25 to 1
-        path = out / f"half-{number:03d}.npz"
-        if path.exists() or ship not in there:
+    for voyage in half_ways(there, count, first):
+        path = out / f"half-{voyage.number:03d}.npz"
+        if path.exists():
             continue
-        of = there[ship]
-        seconds = sailing.LEG_S * max(1.0, of.grid.seconds / 30.0)
-        series, begins = sailing.half_way(ship, 5000 + number, cause, size, seconds)
+        of = there[voyage.ship]
+        series, begins = voyage.series(voyage.seconds(of))
         record = sailing.record_of(series, of.record.profile)
-        times, H = timed_products(of, record, maps[ship])
+        times, H = timed_products(of, record, maps[voyage.ship])
         with files.whole(path) as partial, partial.open("wb") as stream:
-            np.savez(
-                stream, H=H.astype(np.float32), times=times, begins=begins, size=size,
-                cause=np.array(cause), ship=np.array(ship.name),
-            )  # fmt: skip
+            voyage.write(stream, H, times, begins)
 
 
 def main() -> None:

@@ -95,26 +95,27 @@ def reduce_voyages(
 
 
 def learn(
-    parts: Sequence[np.ndarray], voyages: np.ndarray, effects: VoyageEffects, anchor: np.ndarray
-) -> tuple[float, float]:
+    parts: Sequence[np.ndarray], voyages: np.ndarray, effects: VoyageEffects, anchor: np.ndarray,
+    shares: Sequence[float] = INFORMATION_SHARES,
+) -> tuple[float, float]:  # fmt: skip
     """a, how far voyages are from each other in deviations of their parts, and κ, how much of
     itself a voyage counts (a power posterior: Grünwald & van Ommen 2017).
 
         score(a, κ) = Σ_v log p(e_v | the other voyages; a, κ)      `marginal`, with `prior`
         κ = argmax log Σ_a exp score(a, κ),   a² = Σ_a p(a | κ) a²,  p(a | κ) ∝ exp score(a, κ)
 
-    over VOYAGE_SPREADS and INFORMATION_SHARES, from κ = 1 down while the sum grows. The others are
-    the total less one's own, so that it takes a time in proportion to the voyages. One voyage
-    alone says nothing of this: all of `VOYAGE_SPREADS` stay as likely as before.
+    over VOYAGE_SPREADS and `shares`, from the first on while the sum grows. The others are the
+    total less one's own, so that it takes a time in proportion to the voyages. One voyage alone
+    says nothing of this: all of `VOYAGE_SPREADS` stay as likely as before.
 
     parts   G [1 + C, 1 + C] of each part, its own numbers integrated out; `voyages` v of each
     anchor  η [C]
     """
     K = effects.size**-2.0
     count = len(np.unique(voyages))
-    best, chosen = -np.inf, (float(np.sqrt(np.mean(np.square(VOYAGE_SPREADS)))), 1.0)
+    best, chosen = -np.inf, (float(np.sqrt(np.mean(np.square(VOYAGE_SPREADS)))), shares[0])
     tried = [reduce_voyages(parts, voyages, apart * effects.deviation) for apart in VOYAGE_SPREADS]
-    for share in INFORMATION_SHARES if count > 1 else ():
+    for share in shares if count > 1 else ():
         scores = np.zeros(len(VOYAGE_SPREADS))
         for i, (each, volumes) in enumerate(tried):
             total = sum(each, np.zeros_like(each[0]))
