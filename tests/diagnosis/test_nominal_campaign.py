@@ -21,6 +21,7 @@ from shiplog.diagnosis.nominal import (
     voyage_effects,
 )
 from shiplog.diagnosis.nominal.campaign_characteristics import groups_of
+from shiplog.diagnosis.nominal.campaign_prior import INFORMATION_SHARES as SHARES
 from shiplog.diagnosis.nominal.campaign_prior import prior
 from shiplog.diagnosis.nominal.nominal_fit import Converged
 from shiplog.live import left_out
@@ -253,9 +254,9 @@ def test_a_voyage_that_is_left_out_has_no_say(learned):
         scale = np.append(3.0, np.linspace(0.5, 2.0, len(made.each[0]) - 1))
         each = [one * np.outer(scale, scale) if of == number else one
                 for one, of in zip(made.each, made.voyage, strict=True)]  # fmt: skip
-        return left_out.without(replace(made, each=tuple(each)), voyages[:1])
+        return left_out.without(replace(made, each=tuple(each)), voyages[:1], SHARES)
 
-    plain = left_out.without(made, voyages[:1])
+    plain = left_out.without(made, voyages[:1], SHARES)
     assert set(plain.voyage) == set(voyages[1:]) and len(plain.each) < len(made.each)
     same, other = with_other(voyages[0]), with_other(voyages[1])
     assert (same.effects.deviation == plain.effects.deviation).all()

@@ -30,7 +30,7 @@ from pipelines.experiments.hidden_effects.program import ROOT, identity, name
 from pipelines.experiments.hidden_effects.run import Settings
 from shiplog import cli
 from shiplog.diagnosis.decision_parts import ALL, Parts
-from shiplog.diagnosis.hypotheses import evidence
+from shiplog.diagnosis.hypotheses import as_it_stands
 from shiplog.diagnosis.noise import discrepancy
 from shiplog.diagnosis.nominal import campaign_characteristics, nominal_cache, nominal_fit
 from shiplog.machine import files
@@ -77,7 +77,7 @@ def _no_robust_weights(stack: ExitStack) -> None:
     def plain(square, kept):
         return np.where(kept, 1.0, 0.0)
 
-    for module in (campaign_characteristics, evidence):
+    for module in (campaign_characteristics, as_it_stands):
         stack.enter_context(patch.object(module, "robust_weights", plain))
     _learned_anew(stack)
 
