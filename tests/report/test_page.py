@@ -184,6 +184,14 @@ def test_what_to_do_speaks_of_a_test_only_where_there_is_one():
     assert "test below" in cards(page_content.verdict("undecided", notes=[note]))[do]
 
 
+def test_no_change_below_nine_tenths_says_where_the_rest_is():
+    ranking = [{"name": "none", "probability": 0.84}, {"name": "payload", "probability": 0.02}]
+    how = "How sure?"
+    found = cards(page_content.verdict("none", ranking=ranking))[how]
+    assert "0.84" in found and answer.NOT_FAVOURED in found and "Payload" not in found
+    assert answer.NONE_STATED in cards(page_content.verdict("undecided", ranking=ranking))[how]
+
+
 def test_what_acts_beside_a_named_cause_is_said_on_the_first_screen():
     ranking = [{"name": "unknown:heading", "probability": 1.0},
                {"name": "current", "probability": 0.97}]  # fmt: skip

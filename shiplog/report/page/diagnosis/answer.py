@@ -29,6 +29,9 @@ TO_DO = {
 }
 CALIBRATED = "On simulated ships nine in ten of the answers that were given with 0.9 were right."
 NONE_STATED = "An answer is named from 0.9 on: on simulated ships nine in ten were right there."
+NOT_FAVOURED = (
+    "The rest is with causes that these voyages do not favour, and do not exclude either."
+)
 SEPARATES = "A test that separates"  # begins the note of it
 NO_TEST = (
     "Do not change the model yet: it is not known which of these acts. No test that would separate "
@@ -128,8 +131,11 @@ def _sure(verdict: Mapping[str, Any]) -> list[Line]:
         [f"{_begun(spoken(one['name']))}: probability ", probability(one["probability"]), "."]
         for one in stated
     ]
-    sure = ranking[0]["probability"] >= STATED
-    return [*found, [CALIBRATED if sure else NONE_STATED]]
+    if ranking[0]["probability"] >= STATED:
+        return [*found, [CALIBRATED]]
+    if verdict["verdict"] == "none":
+        return [found[0], [NOT_FAVOURED]]
+    return [*found, [NONE_STATED]]
 
 
 def _big(verdict: Mapping[str, Any]) -> list[Line]:
