@@ -36,6 +36,16 @@ def test_what_rounding_makes_negative_is_zero():
     assert logs == pytest.approx([np.log(0.91)])
 
 
+@pytest.mark.parametrize("where", ["b", "c"])
+@pytest.mark.parametrize("value", [np.inf, np.nan])
+def test_what_is_not_finite_is_not_taken_for_rounding(where, value):
+    b, c = np.zeros((1, 3)), np.ones(1)
+    (b if where == "b" else c).flat[0] = value
+    packed = bordered_roots.packed(np.eye(3)[None], b, c)
+    with pytest.raises(np.linalg.LinAlgError):
+        bordered_roots.roots(packed, np.zeros((1, 3, 3)), None)
+
+
 def test_a_matrix_that_is_not_positive_definite_has_no_root():
     packed = bordered_roots.packed(-np.eye(3)[None], np.zeros((1, 3)), np.ones(1))
     with pytest.raises(np.linalg.LinAlgError):

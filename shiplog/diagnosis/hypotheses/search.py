@@ -249,10 +249,11 @@ class Search:
         self._expanded.add((one.causes, one.kind))
         fit = self.table.fit(one)
         best = self.table.ranked()[0].score
-        alone = one is self.table.nothing
+        from_nothing = one is self.table.nothing
         for labels, numbers, predicted in self._additions(one, fit):
             first = not one.causes and one.score > best - SEARCH_NATS
-            worth = first or predicted > (self._least_promise if alone else best - SEARCH_NATS)
+            least = self._least_promise if from_nothing else best - SEARCH_NATS
+            worth = first or predicted > least
             if worth and labels not in self._tried and len(self._tried) < self._most:
                 self.weigh(labels, numbers, fit.point)
         for labels, numbers in reductions(one):

@@ -14,7 +14,7 @@ had before any data:
 
     P(none)/(1 + Σ_favoured w) ≥ STATED,   (1 - P)/P ≤ MOST (1 - π)/π,   P = P(none)/(1 + Σ w)
 
-with π = NO_CHANGE. The others are listed as causes that could not have shown.
+with π = NO_CHANGE: P is at least two thirds.
 """
 
 from __future__ import annotations

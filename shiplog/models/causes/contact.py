@@ -99,7 +99,7 @@ class Contact(Cause):
         slow, off = at["contact.slow"][0], at["contact.off"]
         to, distance = nearest_points(state, at["bank.lines"])
         away = -(to * off).sum(-1)
-        beside = jnp.abs(to[..., 0] * off[:, 1] - to[..., 1] * off[:, 0])  # off the wall's end
+        past_end = jnp.abs(to[..., 0] * off[:, 1] - to[..., 1] * off[:, 0])  # the wall's
         touches = jnp.where(away > -0.5 * length, 1.0, 0.0)
         near = nearest_share(distance, at["bank.same"]) * touches
         c, s = jnp.cos(state[..., 4])[..., None], jnp.sin(state[..., 4])[..., None]
@@ -112,7 +112,7 @@ class Contact(Cause):
         for side in (-SHOULDER, SHOULDER):
             lever = side * length
             gap = away + lever * ahead - 0.5 * breadth * jnp.abs(starboard)
-            gap = jnp.maximum(gap, 0.0) + beside
+            gap = jnp.maximum(gap, 0.0) + past_end
             normal = 0.5 * p[0] * near * jnp.exp(-gap / (REACH * length * jnp.exp(p[2])))
             across = normal * (starboard + grip * ahead)
             x = x + (normal * (ahead - grip * starboard)).sum(-1)

@@ -58,7 +58,7 @@ def roots(
 ) -> tuple[np.ndarray, np.ndarray]:
     """c - bᵀ A⁻¹ b and log|A|, each [S], of Q⁻¹ [U, n, n], the one `which` [S] of them each has, or
     the first. c - bᵀ A⁻¹ b is never negative: what rounding makes so is zero. Raises
-    np.linalg.LinAlgError where an A is not positive definite."""
+    np.linalg.LinAlgError where an A is not positive definite, or anything not finite."""
     kernel, n = _kernel(), of.n
     size = -(-(n + 1) // ROWS) * ROWS
     whole = np.zeros((len(inverse), size, size))
@@ -75,9 +75,11 @@ def roots(
     kernel.functions["roots"](*map(pointer, arrays), blocks, len(of.places), size // ROWS)
     found = np.moveaxis(diagonal, 2, 1).reshape(-1, size)[: of.count, : n + 1]
     lead, last = found[:, :n], found[:, n]
-    if not (np.isfinite(lead).all() and (lead > 0.0).all()):
-        raise np.linalg.LinAlgError("a matrix is not positive definite")
-    return np.where(np.isfinite(last), last, 0.0) ** 2, 2.0 * np.log(lead).sum(1)
+    rounded = np.isnan(last)  # the root of less than nothing
+    sound = np.isfinite(lead).all() and (lead > 0.0).all() and not np.isinf(last).any()
+    if not sound or (rounded.any() and not np.isfinite(of.lanes).all()):
+        raise np.linalg.LinAlgError("a matrix is not positive definite, or not finite")
+    return np.where(rounded, 0.0, last) ** 2, 2.0 * np.log(lead).sum(1)
 
 
 @cache

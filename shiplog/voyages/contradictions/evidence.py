@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -194,8 +195,9 @@ def _way(j: Joined) -> Way | None:
         best = "as it is"
     if left[best] > JOINED:
         return None
-    by_turns = BETTER * j.extra["by turns"] < left["as it is"] > LEAST_MIRRORED
-    if by_turns and (best == "as it is" or j.extra["by turns"] < BETTER * left[best]):
+    by_turns = j.extra.get("by turns", math.inf)  # of no use where it cannot be regressed
+    no_steady_way = left["as it is"] > max(LEAST_MIRRORED, BETTER * by_turns)
+    if no_steady_way and (best == "as it is" or by_turns < BETTER * left[best]):
         return None
     ahead = pairs.natural(j.fits[best]) and (in_radians or not pairs.natural(j.fits["as it is"]))
     if best != "as it is" and left["as it is"] < LEAST_MIRRORED and not ahead:
