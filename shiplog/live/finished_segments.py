@@ -2,7 +2,8 @@
 
 A segment needs CONTEXT_S of rows on either side, in which a clock may be late and over which a
 motion is averaged; at the end of a stretch it does without. Rows that were not measured break a
-stretch, as in a campaign; so do seconds in which a channel is not to be trusted.
+stretch, as in a campaign; so do seconds in which a channel is not to be trusted. A segment in which
+the actuators are moved as in no training voyage (`handling`) is left out and kept in `unlike`.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 import polars as pl
 
 from shiplog.live import segment_products
+from shiplog.live.handling import Unlike
 from shiplog.live.nominal import Nominal, as_campaign
 from shiplog.nomenclature.units import SECOND_NS
 from shiplog.voyages.rows import recording
@@ -39,6 +41,7 @@ class FinishedSegments:
     rows: pl.DataFrame | None = None
     begin: int = 0
     distrusted: list[tuple[int, int]] = field(default_factory=list)  # ns
+    unlike: list[tuple[int, list[Unlike]]] = field(default_factory=list)  # ns, of the last `add`
 
     @property
     def seconds(self) -> float:
@@ -47,6 +50,7 @@ class FinishedSegments:
     def add(self, final: pl.DataFrame, end: bool = False) -> list[Segment]:
         """More final rows: the segments that they finish. `end`: nothing comes any more."""
         self.rows = final if self.rows is None else pl.concat((self.rows, final))
+        self.unlike = []
         held = self.rows.height / RATE_HZ
         if held < self.seconds + CONTEXT_S and not end:
             return []
@@ -84,13 +88,16 @@ class FinishedSegments:
                 self.begin = int(times[at])
             if closed and at < b:
                 self.begin = max(self.begin, int(times[b - 1]) + 1)
+        record = as_campaign(record, self.nominal.timescale)
         trusted = [at for at in chosen if self._trusted(int(times[at]), int(times[at + size]))]
+        new = {at: self.nominal.handling.unlike(record, at) for at in trusted}
+        self.unlike = [(int(times[at + size]), found) for at, found in new.items()]
+        trusted = [at for at in trusted if not new[at]]
         if not trusted:
             return []
         grams = segment_products.grams(
-            self.nominal.campaign.reference, self.nominal.grid,
-            as_campaign(record, self.nominal.timescale), np.array(trusted),
-        )  # fmt: skip
+            self.nominal.campaign.reference, self.nominal.grid, record, np.array(trusted)
+        )
         return [
             Segment(int(times[at]), int(times[at + size]), gram)
             for at, gram in zip(trusted, grams, strict=True)

@@ -12,6 +12,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from shiplog.live.handling import Unlike
 from shiplog.logs.health.health_report import Finding
 from shiplog.nomenclature.units import SECOND_NS
 from shiplog.voyages.rows.fault_detection import FROZEN_S
@@ -38,7 +39,7 @@ class Notice:
     """Something to know of the source. `over`: it is right again."""
 
     time: int  # ns
-    what: str  # silent, quiet, clock, fault, refused, damaged, restarted
+    what: str  # silent, quiet, clock, fault, handling, refused, damaged, restarted
     channel: str
     sentence: str
     over: bool = False
@@ -103,6 +104,18 @@ class Health:
         for _, channel in [key for key in self.now if key[0] == "fault" and key[1] not in lasting]:
             found += self._turn("fault", channel, False, time, "", f"{channel} is right again.")
         return found
+
+    def handling(self, found: Sequence[Unlike], time: int) -> list[Notice]:
+        """Of the actuators that a segment moved as no training voyage does, and of those that are
+        moved again as they do."""
+        new = {one.actuator: one.sentence for one in reversed(found)}
+        notices = []
+        for name, sentence in new.items():
+            notices += self._turn("handling", name, True, time, sentence, "")
+        for _, name in [key for key in self.now if key[0] == "handling" and key[1] not in new]:
+            right = f"{name} is moved as in the training voyages again."
+            notices += self._turn("handling", name, False, time, "", right)
+        return notices
 
     def once(self, what: str, channel: str, sentence: str, time: int) -> list[Notice]:
         """Something that happened; the same words are not said twice."""

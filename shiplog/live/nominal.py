@@ -17,6 +17,7 @@ from shiplog.diagnosis.nominal import nominal_cache, nominal_campaign
 from shiplog.diagnosis.nominal.nominal_campaign import Campaign
 from shiplog.diagnosis.trial import trial_voyages
 from shiplog.live import left_out
+from shiplog.live.handling import Handling
 from shiplog.models import causes as catalogue
 from shiplog.models.causes import Setting
 from shiplog.models.extended import Extended
@@ -38,18 +39,20 @@ LEAST_SEGMENTS = 16  # of the nominal campaign: two parts of eight, fewer of whi
 
 @dataclass(frozen=True)
 class Nominal:
-    """A run's nominal campaign: its record, and what it says of the model."""
+    """A run's nominal campaign: its record, what it says of the model, and how it was sailed."""
 
     record: Record
     campaign: Campaign
+    handling: Handling
 
     @property
     def grid(self) -> SegmentGrid:
         return segments.grid(self.record)
 
     def without_segments(self) -> Nominal:
-        """What segments of a watch need: not those of the campaign."""
-        return replace(self, campaign=self.campaign.without_nominal())
+        """What segments of a watch need: no row and no segment of the campaign."""
+        none = self.record.pick(())
+        return replace(self, record=none, campaign=self.campaign.without_nominal())
 
     @property
     def timescale(self) -> Timescale:
@@ -81,7 +84,8 @@ def nominal(run: Run, store: Store) -> Nominal | None:
     at = nominal_cache.converged(plain, setting, start, scaled)
     found = nominal_cache.characteristics(plain, setting, start, scaled, at)
     learned = nominal_campaign.learn(model, setting, start, scaled, at, found)
-    return Nominal(scaled, left_out.in_common(learned, scaled.voyage[segments.begins(scaled)]))
+    common = left_out.in_common(learned, scaled.voyage[segments.begins(scaled)])
+    return Nominal(scaled, common, Handling.of(scaled))
 
 
 def is_kept(run: Run, store: Store) -> bool:

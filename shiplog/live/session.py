@@ -188,6 +188,8 @@ class Watch:
         if not final.height and not end:
             return
         finished = self.segments.add(final, end)
+        for time, found in self.segments.unlike:
+            yield from self.health.handling(found, time)
         for segment in finished:
             yield from self._segment(segment)
         # of all of them or none: what has been cut is not cut again

@@ -19,6 +19,8 @@ from shiplog.diagnosis.linear import segments
 from shiplog.live import finished_segments, kept, session
 from shiplog.live.alarm import Thresholds, Watcher
 from shiplog.live.events import RowsCame, SegmentDone
+from shiplog.live.handling import Handling
+from shiplog.live.health import Notice
 from shiplog.live.segment_products import Directions
 from shiplog.live.session import Watch
 from shiplog.live.sources.mcap_file import McapFile
@@ -31,6 +33,8 @@ WANTED = fields_read.wanted(PROFILE, {})
 QUICK = Timescale(4.0, 0.4, 0.4)  # a segment of four seconds
 NUMBERS = 4
 CLOCK = 1_780_000_000_000_000_000
+ACTUATORS = len(PROFILE.actuators)
+USUAL = Handling(np.full(ACTUATORS, np.inf), np.full(ACTUATORS, np.inf))
 
 
 @pytest.fixture(scope="module")
@@ -54,11 +58,11 @@ def products_of_rows(monkeypatch):
     monkeypatch.setattr(session, "ErrorNow", lambda run: nothing)
 
 
-def watch(path, out, at=None) -> Watch:
+def watch(path, out, at=None, handling=USUAL) -> Watch:
     grid = segments.grid(SimpleNamespace(timescale=QUICK, step=0.1))
     nominal = SimpleNamespace(
         grid=grid, timescale=QUICK, record=SimpleNamespace(profile=PROFILE),
-        campaign=SimpleNamespace(reference=None),
+        campaign=SimpleNamespace(reference=None), handling=handling,
     )  # fmt: skip
     causes = {"one": np.array([2]), "two": np.array([3])}
     directions = Directions(np.zeros(NUMBERS), np.eye(NUMBERS)[:, :1], np.eye(NUMBERS)[:, 1:2],
@@ -146,6 +150,23 @@ def test_no_segment_counts_while_a_channel_is_silent(tmp_path, content):
     assert any("wind is silent" in s for s in said)
     last = max(e.time for e in events if isinstance(e, RowsCame))
     assert done(events) and last - done(events)[-1].time > 20 * 10**9
+
+
+def test_segments_that_are_handled_as_no_training_voyage_is_are_no_evidence(tmp_path, content):
+    """Rudders of a training campaign that never went beyond 5 deg: they say nothing of what the
+    model does at 35."""
+    path = tmp_path / "voyage.mcap"
+    path.write_bytes(content)
+    usual = watch(path, tmp_path / "usual")
+    all_of_them = done([*sailed(usual, 8), *usual.finish(CLOCK)])
+    small = Handling(np.array([math.radians(5.0), math.radians(5.0), np.inf]), USUAL.pace)
+    strict = watch(path, tmp_path / "strict", handling=small)
+    events = [*sailed(strict, 8), *strict.finish(CLOCK)]
+    assert len(done(events)) < len(all_of_them)
+    said = [e for e in events if isinstance(e, Notice) and e.what == "handling" and not e.over]
+    assert said and "as far as in any training voyage" in said[0].sentence
+    lost = {e.time for e in all_of_them} - {e.time for e in done(events)}
+    assert said[0].time in lost
 
 
 @pytest.mark.long

@@ -37,17 +37,19 @@ def campaign_of(folder: Path) -> Nominal:
 def timed_products(
     of: Nominal, record: Record, directions: segment_products.Directions
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The ends of a record's segments [S], s into it, and H_s [S, N, N]."""
-    ends = segments.begins(nominal.as_campaign(record, of.timescale)) + of.grid.rows
-    return record.time[ends], products(of, record, directions)
+    """The ends of a record's segments [S], s into it, and H_s [S, N, N]; without those that are
+    handled as no training voyage is."""
+    record = nominal.as_campaign(record, of.timescale)
+    rows = np.array(
+        [at for at in segments.begins(record) if not of.handling.unlike(record, at)], int
+    )
+    grams = segment_products.grams(of.campaign.reference, of.grid, record, rows)
+    return record.time[rows + of.grid.rows], np.stack([directions.products(one) for one in grams])
 
 
 def products(of: Nominal, record: Record, directions: segment_products.Directions) -> np.ndarray:
     """H_s [S, N, N] of a record's segments."""
-    record = nominal.as_campaign(record, of.timescale)
-    rows = segments.begins(record)
-    grams = segment_products.grams(of.campaign.reference, of.grid, record, rows)
-    return np.stack([directions.products(one) for one in grams])
+    return timed_products(of, record, directions)[1]
 
 
 def keep_calibrations(there: dict[sailing.Ship, Nominal], maps: dict, out: Path) -> None:
