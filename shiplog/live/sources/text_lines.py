@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import polars as pl
 
-from shiplog.exceptions import ChannelMissing, ShiplogError
+from shiplog.exceptions import ShiplogError
 from shiplog.live.causal_rows import quietly
 from shiplog.logs.conversion import nmea, signalk
 from shiplog.logs.conversion.write import Series
@@ -23,6 +23,7 @@ from shiplog.nomenclature.units import SECOND_NS
 KEPT_S = 120.0
 MOST_LINES = 100_000  # of the last KEPT_S: a line of megabits
 LONGEST_LINE = 1 << 16  # bytes: a line without an end is no line
+FIRST_LINES = 20  # a server's greeting, satellites in view: they need not say where a ship is
 JSON_LINE = re.compile(r"^\s*(\d{10,16};[A-Z];|\{)")
 
 
@@ -54,10 +55,8 @@ class TextLines:
         try:
             with quietly():
                 series = read([line for _, line in self.lines], self.name)
-        except ChannelMissing as error:
-            return {}, error.message
         except ShiplogError as error:
-            return {}, error.message
+            return {}, error.message if len(self.lines) >= FIRST_LINES else ""
         return self._new(series), ""
 
     def _new(self, series: Sequence[Series]) -> dict[str, pl.DataFrame]:
@@ -86,7 +85,7 @@ def read(lines: Sequence[str], name: str) -> list[Series]:
     with files.temporary_folder() as folder:
         path = folder / "lines.log"
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-        return signalk.read_signalk(path).series
+        return signalk.read_signalk(path, name).series
 
 
 def as_frame(series: Series) -> pl.DataFrame:

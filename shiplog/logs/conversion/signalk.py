@@ -112,30 +112,34 @@ def _is_known(line: str) -> bool:
     return split[3][:1] in ("$", "!", "{", "\\") or bool(N2K.match(split[3]))
 
 
-def read_signalk(path: Path) -> NmeaLog:
-    """The topics of such a log. Raises ChannelMissing where it says nothing of the ship."""
+def read_signalk(path: Path, name: str = "") -> NmeaLog:
+    """The topics of such a log. Raises ChannelMissing where it says nothing of the ship.
+
+    name   of it in messages; the file's unless given
+    """
+    name = name or path.name
     deltas, n2k = _Deltas(), Counter[int]()
     nmea, reason = NmeaLog([], 0), ""
     try:
-        nmea = read_sentences(_sentences(path, deltas, n2k), path.name)
+        nmea = read_sentences(_sentences(path, deltas, n2k), name)
     except ChannelMissing as error:  # it has none: the deltas are read all the same
         reason = error.message
     kept = deltas.ours()
     series, findings = topics_of(kept)
     also = _joined(nmea.series, series)
     others = sum(k.used for k in deltas.ships.values()) - kept.used
-    _say(path.name, kept, also, others)
+    _say(name, kept, also, others)
     n2k_findings = _of_bus(path, n2k, nmea.series)
     if not nmea.series:
         said = " ".join((reason, *(finding.sentence for finding in n2k_findings)))
         raise ChannelMissing(
-            f"{path.name} holds no value of the ship that is read. Paths found: "
+            f"{name} holds no value of the ship that is read. Paths found: "
             f"{listed(kept.paths)}. {said}",
             hint=f"log {listed(PREFIXES)}.",
         )
     findings = [*nmea.findings, *findings, *n2k_findings]
     for finding in findings[len(nmea.findings) :]:
-        log.warning("%s: %s", path.name, finding.sentence)
+        log.warning("%s: %s", name, finding.sentence)
     return NmeaLog(nmea.series, nmea.damaged + deltas.damaged, findings)
 
 
