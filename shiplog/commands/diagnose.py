@@ -230,7 +230,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> Diagnosis:
             own = run.extended(run.config.seeds[0], recorded)
             held = HeldOut(cut, own, tried, network, before, profile)
             decision, found = held.simulated_with(decision)
-    lost = held.lost(found) if held else ""
+    lost = held.lost(found, {n.cause.name for n in decision.named}) if held else ""
     if not lost and decision.verdict in answer.OPEN:
         numbers = run.extension_numbers()
         lost = exchanged_twins.explains(tried, decided.point, decision, numbers, profile)

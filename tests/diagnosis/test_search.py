@@ -1,7 +1,7 @@
 """A search over hypotheses finds what was hidden, whatever the catalogue's order."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -9,7 +9,7 @@ import pytest
 from searchable import raised_noise, search_of, searched, trial_with
 from straight import CAUSES, One
 
-from shiplog.diagnosis.hypotheses import evidence, weighing
+from shiplog.diagnosis.hypotheses import evidence, moves, weighing
 from shiplog.diagnosis.hypotheses import search as searching
 from shiplog.diagnosis.hypotheses import table as hypotheses
 from shiplog.diagnosis.hypotheses.search import Search
@@ -112,6 +112,30 @@ def test_a_cause_is_weighed_that_is_far_from_linear(monkeypatch):
     best = made.table.ranked()[0]
     assert 0.7 * max(whole) > searching.SEARCH_NATS
     assert (best.causes, best.kind) == (("drag",), NOMINAL)
+
+
+@dataclass(frozen=True)
+class Whole(One):
+    """There wholly or not at all."""
+
+    whole = (1.2,)
+
+
+@pytest.mark.parametrize("cause", [One("drag"), Whole("drag")])
+def test_a_cause_that_is_there_wholly_is_looked_at_there(monkeypatch, cause):
+    """Half of it is worse than nothing: its derivative promises nothing of it."""
+    scan = evidence.scan
+
+    def blind(*given):
+        level, found = scan(*given)
+        return level, [replace(one, evidence=0.0) if one.name == "drag" else one for one in found]
+
+    monkeypatch.setattr(evidence, "scan", blind)
+    monkeypatch.setattr(Search, "_weigh_ordinary", lambda _: None)
+    made = search_of(*trial_with({"drag": [1.2]}, causes=(cause, One("load"))))
+    made.run()
+    best = made.table.ranked()[0]
+    assert (best.causes == ("drag",)) == bool(cause.whole)
 
 
 def test_the_order_of_the_catalogue_does_not_matter(one):
@@ -225,12 +249,12 @@ def test_either_of_two_causes_may_exclude_the_other(monkeypatch):
 def test_another_form_takes_the_place_of_one_that_promised_more(monkeypatch):
     """Two clocks that exclude each other, and a scan that never proposes the right one."""
     monkeypatch.setattr(One, "compatible", lambda self, label: label.split(":")[0] != self.name)
-    proposed = searching.additions
+    proposed = moves.additions
 
     def misled(*given):
         return [one for one in proposed(*given) if "clock:gnss" not in one[0]]
 
-    monkeypatch.setattr(searching, "additions", misled)
+    monkeypatch.setattr(moves, "additions", misled)
     found = searched({"clock:gnss": [1.2]}, alike=("clock:wind", "clock:gnss", 0.25))
     assert found.table.ranked()[0].causes == ("clock:gnss",)
 
@@ -250,12 +274,12 @@ def test_an_addition_is_judged_where_it_is_linearised_and_not_by_a_derivative(mo
         wrong = {"drag": 1.0, "load": 80.0}
         return base, [replace(f, evidence=wrong.get(f.name, -1.0)) for f in promised]
 
-    monkeypatch.setattr(searching.evidence, "scan", misled)
-    by_derivative = searching.additions(found.table, nothing, fit, causes)
+    monkeypatch.setattr(evidence, "scan", misled)
+    by_derivative = moves.additions(found.table, nothing, fit, causes)
     assert [labels for labels, _, _ in by_derivative] == [("load",)]
-    nearer = searching.additions(found.table, nothing, fit, causes, nearer=True)
+    nearer = moves.additions(found.table, nothing, fit, causes, nearer=True)
     assert nearer[0][0] == ("drag",)
-    monkeypatch.setattr(searching.evidence, "scan", scan)
+    monkeypatch.setattr(evidence, "scan", scan)
     (of_drag,) = (score for labels, _, score in nearer if labels == ("drag",))
     found.weigh(("drag",), {"drag": np.zeros(1)}, point)
     reached = found.table.scale.score(
@@ -263,7 +287,7 @@ def test_an_addition_is_judged_where_it_is_linearised_and_not_by_a_derivative(mo
     )
     assert of_drag == pytest.approx(reached, abs=2.0)
     monkeypatch.setattr(trial.__class__, "linearise", diverging)
-    assert searching.additions(found.table, nothing, fit, causes, nearer=True) == []
+    assert moves.additions(found.table, nothing, fit, causes, nearer=True) == []
 
 
 def diverging(*given):
@@ -335,7 +359,7 @@ def test_a_force_of_the_place_is_unknown_and_depends_on_position():
 def test_without_a_cause_the_search_goes_on_to_what_stood_behind_it(monkeypatch):
     """One contender at a time, and two causes hidden, one of them with half the columns of a third:
     without the strongest the third is weighed, which was not worth a look together with it."""
-    monkeypatch.setattr(searching, "CONTENDERS", 1)
+    monkeypatch.setattr(moves, "CONTENDERS", 1)
     found = searched({"drag": [1.2]}, alike=("drag", "load", 0.7))
     assert found.table.ranked()[0].causes == ("drag",)
     weighed = {h.causes for h in found.table.ranked()}

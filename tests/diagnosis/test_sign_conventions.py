@@ -225,6 +225,21 @@ def test_a_window_that_diverges_is_no_sign_of_a_convention(monkeypatch, divergin
     assert bool(why) == said
 
 
+def test_a_convention_that_is_a_cause_is_left_to_the_search(monkeypatch):
+    """Two rudders exchanged is a cause of the catalogue: with nothing left of the error it is not
+    said before that is asked, and a decision that names it is not taken back."""
+    nominal = SimpleNamespace(pick=None)
+    model = SimpleNamespace(
+        profile=PROFILE, losses=lambda cut: np.full(5, 10.0 if cut is nominal else 5000.0)
+    )
+    monkeypatch.setattr(sign_conventions, "_hold", lambda cut: 1e4)
+    found = sign_conventions.Tried("the rudder's sign turned round", "`sign`", 10.0, 1.0)
+    for cause, said in (("", True), ("actuators_exchanged", False)):
+        one = replace(found, cause=cause)
+        monkeypatch.setattr(sign_conventions, "try_conventions", lambda *given, one=one: one)
+        assert bool(sign_conventions.sufficient_convention(model, windows(5), nominal)) == said
+
+
 @pytest.mark.parametrize("unit", ["kn", "km/h"])
 def test_of_two_units_that_err_alike_the_one_that_the_profile_states_is_said(unit):
     """km/h called knots and m/s called knots differ by 5 %: the profile says knots, or not."""

@@ -154,6 +154,12 @@ def test_a_sign_that_is_the_other_way_round_is_found(sea, words):
     why = HeldOut(turned, model, sea.done.trial).lost(None)
     if "sign" in words:  # the others do not double the error of so short a trial
         assert words in why and f"L is {found.loss:.0f}" in why
+    if "exchanged" in words:  # a cause, too: a decision that names it is not taken back
+        assert found.cause == "actuators_exchanged"
+        held = HeldOut(turned, model, sea.done.trial)
+        held.__dict__["_other"] = replace(found, loss=0.0)
+        assert words in held.lost(None, {"current"})
+        assert held.lost(None, {found.cause}) == ""
     assert HeldOut(cut, model, sea.done.trial).lost(None) == ""
 
 

@@ -17,10 +17,9 @@ remainder R adds to it. S with R is B with R whose further numbers are zero, so 
 
 and what R could explain for S it would explain for B as well. Once B is banned, they are weighed.
 
-What a cause adds is predicted by its derivative where the hypothesis is linearised (12). Of
-coefficients that were fitted to nominal voyages that is near enough. Of given coefficients the path
-is far from the model's own, and what is not linear in between decides. Additions are then looked at
-`nearer`: linearised at the numbers that the derivative gives, before any is fitted.
+What a cause adds is predicted by its derivative where the hypothesis is linearised (`moves`). Of a
+cause that is there wholly or not at all, such as two actuators exchanged, half is worse than
+nothing, and its derivative says little: it is looked at where it is `whole`, too.
 """
 
 from __future__ import annotations
@@ -34,9 +33,10 @@ import numpy as np
 
 from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.decision_parts import ALL, Parts
-from shiplog.diagnosis.hypotheses import evidence
+from shiplog.diagnosis.hypotheses import evidence, moves
 from shiplog.diagnosis.hypotheses.hypothesis import Hypothesis, holds_one, name_of
 from shiplog.diagnosis.hypotheses.intermittent import ResidualNoise
+from shiplog.diagnosis.hypotheses.moves import LIKELY, Addition
 from shiplog.diagnosis.hypotheses.table import Hypotheses, Table, rescored, shortened
 from shiplog.diagnosis.hypotheses.weighing import (
     RAISING,
@@ -52,19 +52,10 @@ from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED
 from shiplog.diagnosis.trial.fitted import ExpectedEvidence, Fit, Point
 from shiplog.diagnosis.trial.trial import Trial
 from shiplog.machine import memory
-from shiplog.models.causes import Cause
 
 MOST_CAUSES = 5  # of a hypothesis; of a ship with more the given coefficients are another ship's
 MOST_SETS = 16  # that are linearised; the others are far behind
-LIKELY = 0.3  # share of the best one's evidence: before it is linearised a cause may lack more
 WHATEVER_SIZE = 100.0  # realistic sizes, beyond which no cause is what its numbers say
-CONTENDERS = 3  # causes that are tried from one hypothesis
-# nats of the best addition, up to which all are looked at from nearer: on the Esso Osaka with its
-# published coefficients a derivative promised from 50 too few to 80 too many
-CLOSE_CALL = 200.0
-
-
-Addition = tuple[tuple[str, ...], dict[str, np.ndarray], float]
 
 log = logging.getLogger(__name__)
 
@@ -102,6 +93,7 @@ class Search:
         if () not in self._tried:
             self.weigh((), {}, self.table.first, later=True)
             self._scan_each_alone()
+            self._weigh_wholes()
             if self.likely:
                 self.weigh(tuple(sorted(self.likely)), self.likely, self.table.first)
             elif self._without_remainders:
@@ -234,6 +226,26 @@ class Search:
         if best is not None and best.evidence > none.evidence:
             self.weigh((best.name,), best.numbers, table.first)
 
+    def _weigh_wholes(self) -> None:
+        """The causes that are there wholly or not at all, each alone, from where it is wholly
+        there: where that explains something, and more than its derivative promises."""
+        table, nothing = self.table, self.table.nothing
+        if table.trial.as_nominal:
+            return
+        fit = table.fit(nothing)
+        here = moves.value(table, fit.point, fit)
+        for cause in table.catalogue:
+            if not cause.whole or self._banned((cause.label,)):
+                continue
+            numbers = {cause.label: np.array(cause.whole)}
+            try:  # about a path of its own: that without the cause is of another ship
+                point = table.trial.linearise(numbers, None, fit.estimate.noise_factor)
+            except np.linalg.LinAlgError:
+                continue
+            explained = moves.value(table, point, fit, tuple(numbers)) - here
+            if explained > max(table.alone.get(cause.label, 0.0), SEARCH_NATS):
+                self.weigh((cause.label,), numbers, point)
+
     def _weigh_again(self, labels: tuple[str, ...], one: Hypothesis, fit: Fit) -> None:
         """A set with one cause less than the best hypothesis, with that one's noise: it may have
         been weighed with noise that was less probable, which is no evidence for the cause."""
@@ -256,7 +268,7 @@ class Search:
             worth = first or predicted > least
             if worth and labels not in self._tried and len(self._tried) < self._most:
                 self.weigh(labels, numbers, fit.point)
-        for labels, numbers in reductions(one):
+        for labels, numbers in moves.reductions(one):
             if labels in self._tried:
                 self._weigh_again(labels, one, fit)
             elif len(self._tried) < self._most:
@@ -274,11 +286,11 @@ class Search:
         for label in one.causes:
             rest = [n for n in one.causes if n != label]
             for other in table.catalogue:
-                fits = all(_compatible(other, table.by[n]) for n in rest)
+                fits = all(moves.compatible(other, table.by[n]) for n in rest)
                 if name_of(other.label) != name_of(label) or other.label == label or not fits:
                     continue
                 promised = self.scanned[other.label] - nothing
-                if _compatible(other, table.by[label]) or promised <= 0.0:
+                if moves.compatible(other, table.by[label]) or promised <= 0.0:
                     continue
                 if promised >= LIKELY * (self.scanned[label] - nothing):
                     numbers = {n: one.estimate.numbers[n] for n in rest}
@@ -294,7 +306,7 @@ class Search:
             return []
         catalogue = self.table.catalogue
         allowed = [c for c in catalogue if not self._banned((*one.causes, c.label))]
-        return additions(self.table, one, fit, allowed, self.nearer)
+        return moves.additions(self.table, one, fit, allowed, self.nearer)
 
     def _scan_each_alone(self) -> None:
         """What each cause explains by itself, and what would show of it, whatever is searched."""
@@ -326,68 +338,3 @@ class Search:
         ]  # fmt: skip
         if blind:
             log.info("not detectable at realistic size: %s", ", ".join(dict.fromkeys(blind)))
-
-
-def additions(
-    table: Hypotheses, one: Hypothesis, fit: Fit, causes: Sequence[Cause], nearer: bool = False
-) -> list[Addition]:
-    """The sets with one cause more than a hypothesis that are worth a look, by their log Bayes
-    factors where it is linearised (12), or where each of them is: labels, numbers to start from,
-    score expected."""
-    candidates = [
-        c for c in causes
-        if c.label not in one.causes
-        and all(_compatible(c, table.by[label]) for label in one.causes)
-    ]  # fmt: skip
-    _, found = evidence.scan(
-        table.trial, fit.point, candidates, (*table.trial.fixed, *one.causes),
-        one.estimate.noise_factor, one.remainder,
-    )  # fmt: skip
-    promised = {f.name: f.evidence for f in found if f.evidence > 0.0}
-    if nearer and max(promised.values(), default=0.0) < CLOSE_CALL:
-        of, here = {f.name: f.numbers for f in found}, _value(table, fit.point, fit)
-        promised = {name: _from_nearer(table, fit, of[name]) - here for name in promised}
-    most, scale, added = max(promised.values(), default=0.0), table.scale, []
-    for f in sorted(found, key=lambda f: -promised.get(f.name, -math.inf)):
-        gained = promised.get(f.name, 0.0)
-        if gained <= 0.0 or gained < LIKELY * most:
-            continue
-        labels = tuple(sorted((*one.causes, f.name)))
-        numbers = {**one.estimate.numbers, **f.numbers}
-        added.append((labels, numbers, scale.score(one.evidence + gained, labels, one.kind)))
-    return added[:CONTENDERS]
-
-
-def _from_nearer(table: Hypotheses, fit: Fit, added: Mapping[str, np.ndarray]) -> float:
-    """Log evidence [nats] of a fit and a cause in addition, with the trial linearised at both their
-    numbers, at the fit's own noise; minus infinity where the model diverges there."""
-    numbers = {**fit.estimate.numbers, **added}
-    try:
-        point = table.trial.linearise(
-            numbers, fit.point, fit.estimate.noise_factor, fit.remainder
-        )  # fmt: skip
-    except np.linalg.LinAlgError:
-        return -math.inf
-    return _value(table, point, fit, tuple(numbers))
-
-
-def _value(
-    table: Hypotheses, point: Point, fit: Fit, included: tuple[str, ...] | None = None
-) -> float:
-    """Log evidence [nats] at a point, with the noise and the remainder of a fit; of its causes,
-    unless others are `included`."""
-    causes = fit.included if included is None else included
-    return evidence.level(
-        table.trial, point, fit.estimate.noise_factor, causes, fit.remainder
-    ).value  # fmt: skip
-
-
-def reductions(one: Hypothesis) -> list[tuple[tuple[str, ...], dict[str, np.ndarray]]]:
-    """The sets with one cause less than a hypothesis: labels, numbers to start from."""
-    fewer = (tuple(n for n in one.causes if n != label) for label in one.causes)
-    return [(labels, {n: one.estimate.numbers[n] for n in labels}) for labels in fewer if labels]
-
-
-def _compatible(one: Cause, other: Cause) -> bool:
-    """Whether both may be in one hypothesis: either may say that they may not."""
-    return one.compatible(other.label) and other.compatible(one.label)

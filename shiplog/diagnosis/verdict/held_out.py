@@ -8,7 +8,7 @@ the only voyage.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -166,18 +166,19 @@ class HeldOut(Rollouts):
             self.parts(self.states_after(rest)), self.parts(self.states_after(decision))
         )
 
-    def lost(self, found: Gain | None) -> str:
+    def lost(self, found: Gain | None, named: Collection[str] = ()) -> str:
         """Why no cause can be named; empty where one can.
 
-        Either another convention explains the error better than all named causes do, or the model
-        is worse than holding the velocity, with the named causes in it too.
+        Either another convention explains the error better than all named causes do, and is none of
+        them, or the model is worse than holding the velocity, with the named causes in it too.
         """
         counted = self.cut.pick(np.flatnonzero(self.counted))
         own = float(self.losses_before[self.counted].sum(1).mean())
         after = own if found is None else min(own, found.after)
         hold = float(parts(counted.state[:, :1] - counted.state, counted.dt).sum(1).mean())
         other = self._other
-        if sign_conventions.explains(other, own, after, hold, self._level):
+        explains = sign_conventions.explains(other, own, after, hold, self._level)
+        if explains and other.cause not in named:
             return sign_conventions.sentence(other, own)
         if own <= thresholds.WORSE_THAN_HOLDING * hold or after <= hold:
             return ""

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shiplog.diagnosis import thresholds
+from shiplog.models.causes.actuator_pairs import ActuatorsExchanged
 from shiplog.nomenclature.frames import axes
 from shiplog.ship_profile.profile import Profile
 from shiplog.ship_profile.profile_lines import declared
@@ -60,12 +61,14 @@ class Turned:
     """A convention, in words; the windows under it; and the key of the profile to change.
 
     stated   whether the profile states the unit that the slip is called; True of what is no unit
+    cause    name of the cause of the catalogue that is the same; empty of most
     """
 
     words: str
     windows: Windows
     key: str
     stated: bool = True
+    cause: str = ""
 
 
 @dataclass(frozen=True)
@@ -75,12 +78,14 @@ class Tried:
     loss   mean L; where the convention makes velocities smaller, by so much greater as it would
            be made less by that alone
     there  L of the nominal windows under it over L of them as they are; None without any
+    cause  as `Turned` has it
     """
 
     words: str
     key: str
     loss: float
     there: float | None = None
+    cause: str = ""
 
 
 def try_conventions(
@@ -99,7 +104,7 @@ def try_conventions(
     found, handicap = [], {INSTEAD: NEARLY}
     for one in conventions(simulator.profile, cut, read_as):
         loss = mean(simulator, one.windows) * max(still / max(_hold(one.windows), 1e-12), 1.0)
-        found.append(Tried(one.words, one.key, loss))
+        found.append(Tried(one.words, one.key, loss, cause=one.cause))
         if not one.stated:
             handicap[one.words] = UNSTATED
     found.sort(key=lambda one: one.loss * handicap.get(one.words, 1.0))
@@ -183,6 +188,7 @@ def _actuator_signs(profile: Profile, cut: Windows, read_as: Profile | None) -> 
             yield Turned(
                 f"the two {kind}s exchanged", replace(cut, actuator=swapped),
                 f"`topic` of each [[actuators]] of the kind {kind!r}",
+                cause=ActuatorsExchanged.name,
             )  # fmt: skip
         units = {"rudder": ANGLES, "propeller": TURNS}.get(kind, {})
         for factor, words in units.items():
@@ -367,10 +373,13 @@ def sufficient_convention(
     simulator: ExtendedSimulator, cut: Windows, nominal: Windows, read_as: Profile | None = None
 ) -> str:
     """What a convention explains so well that no search for causes is needed: it leaves next to
-    nothing of what the trial has more than the nominal voyages. Empty where none does."""
+    nothing of what the trial has more than the nominal voyages. Empty where none does, and where it
+    is a cause, too, which is searched for."""
     cut, nominal = simulated(simulator, cut), simulated(simulator, nominal)
     own, level = mean(simulator, cut), mean(simulator, nominal)
     found = try_conventions(simulator, cut, nominal, read_as)
+    if found.cause:
+        return ""
     if own - found.loss < thresholds.ALL_EXCESS * (own - level):
         return ""
     return sentence(found, own) if explains(found, own, own, _hold(cut), level) else ""
