@@ -62,6 +62,7 @@ class Turned:
 
     stated   whether the profile states the unit that the slip is called; True of what is no unit
     cause    name of the cause of the catalogue that is the same; empty of most
+    idle     the windows with what the unit is of at zero; None of what is no actuator's unit
     """
 
     words: str
@@ -69,6 +70,7 @@ class Turned:
     key: str
     stated: bool = True
     cause: str = ""
+    idle: Windows | None = None
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,8 @@ def try_conventions(
     (RUNAWAY of one in which the model diverges), L_hold of constant velocities as the windows are
     and L_hold' under the convention, and a handicap h (NEARLY, UNSTATED, else 1).
     Where nominal windows are given, conventions that these show as well (L'/L ≤ THERE_TOO) are left
-    out: their model has them, too.
+    out: their model has them, too. So is a unit of actuators that explains no more than that they
+    do nothing, unless L' < TURNED_SIGN L_idle: a rudder that turns too little is none in degrees.
 
     read_as   the profile through which the windows were read; None where it is not known
     """
@@ -104,6 +107,8 @@ def try_conventions(
     found, handicap = [], {INSTEAD: NEARLY}
     for one in conventions(simulator.profile, cut, read_as):
         loss = mean(simulator, one.windows) * max(still / max(_hold(one.windows), 1e-12), 1.0)
+        if one.idle is not None and loss >= thresholds.TURNED_SIGN * mean(simulator, one.idle):
+            continue
         found.append(Tried(one.words, one.key, loss, cause=one.cause))
         if not one.stated:
             handicap[one.words] = UNSTATED
@@ -195,7 +200,7 @@ def _actuator_signs(profile: Profile, cut: Windows, read_as: Profile | None) -> 
             yield Turned(
                 f"the {kind}'s values taken as {words}", scaled(1.0 / factor),
                 f"`unit` of each [[actuators]] of the kind {kind!r}",
-                _stated(words, read_as, "", kind),
+                _stated(words, read_as, "", kind), idle=scaled(0.0),
             )  # fmt: skip
 
 
