@@ -159,6 +159,25 @@ def test_what_was_not_used_does_not_pull():
     assert y == pytest.approx(cut.y, abs=1e-6)
 
 
+def test_a_path_that_is_predicted_from_too_far_is_far_from_that_of_its_numbers():
+    """A rudder that turns the ship four times as much, predicted from the true one: turned about,
+    the ship's sway and surge are none of what the derivative says. A tenth more is near enough."""
+    true = replace(path(), acceleration=np.zeros((4, 3, GRID.nodes)))
+    cut = simulated(true)
+    firm = replace(WIDE, acceleration=0.02 * WIDE.acceleration, start=0.1 * WIDE.start)
+    linear = linearisation.linear(Toy(), THETA, cut, GRID, true, *nothing(cut))
+    left = {}
+    for factor in (1.1, 4.0):
+        other = THETA * np.array([1.0, factor, 1.0, 1.0])
+        found = linearisation.predict_path(linear, other - THETA, firm)
+        there = linearisation.linear(Toy(), other, cut, GRID, found, *nothing(cut))
+        left[factor] = linearisation.left_to_pull(there, firm)
+        fitted = linearisation.fit_path(Toy(), other, cut, GRID, firm, found)
+        after = linearisation.linear(Toy(), other, cut, GRID, fitted, *nothing(cut))
+        assert linearisation.left_to_pull(after, firm) < linearisation.PULLED_NATS
+    assert left[1.1] < linearisation.FAR_NATS < left[4.0]
+
+
 def test_a_linearisation_expects_where_its_path_will_be_pulled():
     """There is no acceleration but the rudder's, a tenth less than the model's: pulled, the path
     has one that makes up for it. Once the model has it right there is none, and what is expected

@@ -33,6 +33,9 @@ KIND = np.array(((0, 2), (1, 3), (0, 2), (1, 3), (4, 4), (5, 5)))  # channels of
 RUN_AWAY = 10.0  # expected distances from its measurement, beyond which a path has diverged
 MOST_PULLS = 20  # steps of a path towards its measurement, at most
 PULLED_NATS = 0.5  # gain of a step in any segment: with less, the path has converged
+# The same of a path that was predicted, from which on its numbers were too far from those that it
+# was predicted from. Steps of a fit leave up to 14; a rudder's limit from none, 300 to 5e7.
+FAR_NATS = 20.0
 
 
 class Smooth(Physical, Protocol):
@@ -159,6 +162,15 @@ def predict_path(
     linear shows when the model is linearised there. `about` as in `fit_path`."""
     gap = linear.e - linear.j @ d - np.einsum("sbcz,sz->sbc", linear.z, linear.path.coordinates)
     return _closer(linear.path, gap, linear.z, linear.cut.used, wide, about)[0]
+
+
+def left_to_pull(linear: Linear, wide: Wide, about: np.ndarray | None = None) -> float:
+    """The most nats that one more step of `fit_path` is expected to gain in a segment, from where
+    the segments are linearised: of a path that was predicted, how far it is from that of its
+    numbers. `about` as in `fit_path`."""
+    gap = linear.e - np.einsum("sbcz,sz->sbc", linear.z, linear.path.coordinates)
+    used = linear.cut.used & ~linear.lost[:, None, None]
+    return _closer(linear.path, gap, linear.z, used, wide, about)[1]
 
 
 def _closer(

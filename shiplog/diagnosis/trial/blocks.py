@@ -151,6 +151,13 @@ class Block:
         about = ref.expected_acceleration(cut, self.trial.grid)
         return linearisation.predict_path(point.linear, whole - stood, wide, about)
 
+    def left_to_pull(self, at: str, wide: Wide) -> float:
+        """How far a path that was predicted is from that of its numbers, in nats."""
+        point = self._point(at)
+        ref, cut, _ = self._read(point.numbers)
+        about = ref.expected_acceleration(cut, self.trial.grid)
+        return linearisation.left_to_pull(point.linear, wide, about)
+
     def place(self, at: str) -> tuple[np.ndarray, float]:
         """The segments linearised: which are lost [S], and max |e| over all."""
         linear = self._point(at).linear

@@ -197,21 +197,28 @@ class SharedTrial(Trial):
         wide = ref.wide
         if noise_factor is not None:
             wide = ref.allowed_distance(noise_factor, remainder or Remainder())
+        rounds = linearisation.MOST_PULLS
         if isinstance(near, Point):
             paths = shared.ask("predict", [(one,) for one in places_of(near)], numbers, wide)
+            found = self._placed(numbers, _joined(paths))
+            left = shared.ask("left_to_pull", [(one,) for one in places_of(found)], wide)
+            if max(left) < linearisation.FAR_NATS:
+                return self._refuse_divergent(found)
         else:
-            paths, rounds = None if near is None else shared.paths(near), 1 if near else None
-            for _ in range(rounds or linearisation.MOST_PULLS):
-                found = shared.ask("pull", self._starts(paths), numbers, wide)
-                paths = [path for path, _ in found]
-                if max(gained for _, gained in found) < linearisation.PULLED_NATS:
-                    break
-            assert paths is not None
-        path = Path(*(np.concatenate([getattr(one, name) for one in paths])
-                      for name in ("start", "acceleration")))  # fmt: skip
-        return self.linearise_about(numbers, path)
+            paths, rounds = None if near is None else shared.paths(near), 1 if near else rounds
+        for _ in range(rounds):
+            pulled = shared.ask("pull", self._starts(paths), numbers, wide)
+            paths = [path for path, _ in pulled]
+            if max(gained for _, gained in pulled) < linearisation.PULLED_NATS:
+                break
+        assert paths is not None
+        return self.linearise_about(numbers, _joined(paths))
 
     def linearise_about(self, numbers: Numbers, path: Path) -> Point:
+        return self._refuse_divergent(self._placed(numbers, path))
+
+    def _placed(self, numbers: Numbers, path: Path) -> Point:
+        """Linearised about this very path, wherever the model diverges."""
         shared = self.shared
         assert shared is not None
         key = f"point {next(shared.count)}"
@@ -219,9 +226,7 @@ class SharedTrial(Trial):
         placed = shared.ask("place", [(one,) for one in places])
         lost = np.concatenate([lost for lost, _ in placed])
         farthest = max(away for _, away in placed)
-        return self._refuse_divergent(
-            Point(numbers, path, Remote(shared, places, path, lost, farthest))
-        )
+        return Point(numbers, path, Remote(shared, places, path, lost, farthest))
 
     def _starts(self, paths: Sequence[Path] | None) -> list[tuple[Kept, ...]]:
         assert self.shared is not None
@@ -270,3 +275,9 @@ class SharedTrial(Trial):
     def less_misfit(self, linear: Linear, d: np.ndarray) -> tuple[Linear, np.ndarray]:
         whole = linear.gathered() if isinstance(linear, Remote) else linear
         return super().less_misfit(whole, d)
+
+
+def _joined(paths: Sequence[Path]) -> Path:
+    """Of all segments, from those of each block."""
+    return Path(*(np.concatenate([getattr(one, name) for one in paths])
+                  for name in ("start", "acceleration")))  # fmt: skip

@@ -146,7 +146,8 @@ class Trial:
     ) -> Point:
         """The trial linearised with these numbers (1), about a path fitted to the measurement.
 
-        near          a path to start from, or a point whose linearisation predicts the path
+        near          a path to start from, or a point whose linearisation predicts the path: where
+                      what it predicts is far off, the path is fitted from there
         noise_factor  λ that limits the path. A path that follows every wave of the noise is as far
                       from the likely one as a free rollout; its nonlinearity imitates evidence
         remainder     whose process noise and intermittent force the path may follow
@@ -164,11 +165,13 @@ class Trial:
         if isinstance(near, Point):
             stood = np.concatenate((ref.theta, ref.columns.numbers(dict(near.numbers))))
             path = linearisation.predict_path(near.linear, whole - stood, wide, about)
+            found = Point(numbers, path, self.linear_at(numbers, path))
+            if linearisation.left_to_pull(found.linear, wide, about) < linearisation.FAR_NATS:
+                return self._refuse_divergent(found)
+            near, rounds = path, linearisation.MOST_PULLS
         else:
             rounds = 1 if near else linearisation.MOST_PULLS
-            path = linearisation.fit_path(
-                ref.model, whole, cut, self.grid, wide, near, rounds, about
-            )
+        path = linearisation.fit_path(ref.model, whole, cut, self.grid, wide, near, rounds, about)
         return self.linearise_about(numbers, path)
 
     def linearise_about(self, numbers: Numbers, path: Path) -> Point:
