@@ -3,10 +3,14 @@
 Over windows of T seconds, a velocity w (surge, sway or yaw rate) follows its forces F_j, each in
 the direction that the profile states (after Nomoto 1957, any decay λ):
 
-    w(t + T) - w(t) = -λ w(t) + Σ_j b_j F̄_j + c,     b_j > 0
+    w(t + T) - w(t) = -λ w(t) + Σ_j b_j F̄_j + d R̄ + c,     b_j > 0
 
     rudder      yaw    δ (U² + (nD/2)²)            while the ship goes ahead
     thrust      surge  n|n| cos α,  sway  n|n| sin α,  yaw  n|n| (x sin α - y cos α)
+
+R is what a turn does by itself: r² of the surge, which it slows, and u r of the sway, to which it
+goes round. A ship that turns while a screw turns fastest, or by a thruster at its bow, would else
+seem to be driven the other way. The yaw rate has none.
 
 b_j < 0 of one actuator alone and together with the others, by far more than its interval: its sign,
 or its place, is another one than the profile says.
@@ -41,6 +45,7 @@ HELD_RAD, HELD_LENGTHS = math.radians(5.0), 2.0  # a rudder that is put over, an
 CIRCLES_RAD, FEW_TURNS = math.pi, 0.1  # turned in all, and the share that may go the other way
 OPPOSED = -0.9  # correlation of two rudders that always move against each other
 LOOSE = 100.0  # prior of a coefficient, of the change: of two that are one nothing is known
+TURNING_S = 2.0  # over which the heading's change is averaged, before its noise is squared
 LEAST_ARM = 0.02  # lever, of the ship's length: less turns nothing
 
 
@@ -165,11 +170,18 @@ def driven(t: Track, yaw_rate: np.ndarray) -> list[Driven]:
             name: part[2] for name, part in thrusts.items()
             if _acts(part[2] / length, thrusts, LEAST_ARM)
         }  # fmt: skip
-        found += _counted(t, "surge", u, ahead, everywhere)
-        found += _counted(t, "sway", v, side, everywhere)
+        r = _heading_rate(t)
+        found += _counted(t, "surge", u, ahead, everywhere, turning_by=r**2)
+        found += _counted(t, "sway", v, side, everywhere, turning_by=u * r)
         if len(turning) > 1 or not rudders:
             found += _counted(t, "yaw rate", yaw_rate, turning, everywhere)
     return found
+
+
+def _heading_rate(t: Track) -> np.ndarray:
+    """ψ̇ [n] rad/s, over TURNING_S: the sense of the heading is known, that of a gyro may not be."""
+    change = np.angle(t.ahead[1:] * t.ahead[:-1].conj()) / STEP_S
+    return moving.mean(np.nan_to_num(np.append(change, 0.0)), round(TURNING_S / STEP_S))
 
 
 def _steady_turns(
@@ -203,10 +215,10 @@ def _acts(part: np.ndarray, thrusts: dict, share: float = 0.2) -> bool:
 
 def _counted(
     t: Track, direction: str, moved: np.ndarray, forces: dict[str, np.ndarray], where: np.ndarray,
-    least: float = 0.0,
+    least: float = 0.0, turning_by: np.ndarray | None = None,
 ) -> Iterator[Driven]:  # fmt: skip
     """Each force against the change of one velocity, at the length of window that tells most, of
-    those from `least` [s] on."""
+    those from `least` [s] on. turning_by   R [n]"""
     if not forces:
         return
     known = t.measured & where
@@ -215,6 +227,7 @@ def _counted(
     inside = np.concatenate(([0], np.cumsum(known[: t.bins * ROWS])))
     means = {name: t.integral(np.nan_to_num(one)) for name, one in forces.items()}
     velocity = t.binned(moved)
+    turns = None if turning_by is None else t.integral(np.nan_to_num(turning_by))
     best: dict[str, Driven] = {}
     for seconds in LENGTHS_S:
         if seconds < least and seconds != LENGTHS_S[-1]:
@@ -224,7 +237,8 @@ def _counted(
         w = w.chosen(rows >= 0.9 * ROWS * (seconds + 1))
         if len(w.first) < FEWEST:
             continue
-        for one in _drive_at_length(w, direction, _averaged(velocity, seconds), means, least > 0.0):
+        averaged, R = _averaged(velocity, seconds), None if turns is None else w.change(turns)
+        for one in _drive_at_length(w, direction, averaged, means, least > 0.0, R):
             before = best.get(one.name)
             if before is None or one.explained > before.explained:
                 best[one.name] = one
@@ -237,13 +251,16 @@ def _averaged(velocity: np.ndarray, seconds: int) -> np.ndarray:
 
 
 def _drive_at_length(
-    w: Windows, direction: str, velocity: np.ndarray, means: dict[str, np.ndarray], steers: bool
-) -> Iterator[Driven]:
+    w: Windows, direction: str, velocity: np.ndarray, means: dict[str, np.ndarray], steers: bool,
+    R: np.ndarray | None = None,
+) -> Iterator[Driven]:  # fmt: skip
     """At one length of window; steers: the forces are those of rudders."""
     y, start = w.change(velocity), velocity[w.first]
     if not np.std(start) > 0 or not np.std(y) > 0:
         return
     still = [start / np.std(start), np.ones(len(y))]
+    if R is not None and np.std(R) > 0.0:
+        still.append(R / np.std(R))
     scaled = {}
     for name, total in means.items():
         force = w.change(total)
@@ -253,10 +270,10 @@ def _drive_at_length(
             scaled[name] = force / np.std(force)
     if not scaled:
         return
-    free = [np.inf] * 3
-    without = regress(y, still, w.block, free[:2])
+    free = [np.inf] * (1 + len(still))
+    without = regress(y, still, w.block, free[1:])
     loose = [LOOSE * float(np.std(y))] * len(scaled)
-    together = regress(y, [*scaled.values(), *still], w.block, [*loose, np.inf, np.inf])
+    together = regress(y, [*scaled.values(), *still], w.block, [*loose, *free[1:]])
     if without is None or together is None:
         return
     left = _spread_left(y, still, without.theta)

@@ -244,6 +244,9 @@ def heading_and_yaw_rate(t: Track) -> Joined | None:
     else:
         return None
     both = float(by_heading.sum()), float(by_rate.sum())
+    if abs(np.mean(y[turns])) > np.std(y[turns]):
+        # all turn to one side, about as fast: of these alone a ratio is as well an offset
+        turns = np.ones(len(y), bool)
     w, y, x = w.chosen(turns), y[turns], x[turns]
     time = np.full(len(y), w.seconds)
     late = w.change(t.binned(t.yaw_rate))
