@@ -110,3 +110,18 @@ def test_a_gyro_of_the_wrong_sense_is_no_fault_of_the_screws(name, channels):
     raw = measured(made(), "ned", noise=FINE)
     said = contradictions.find(table(raw | {"rate": -raw["rate"]}, p), p).findings
     assert {one.channel for one in said} == channels
+
+
+@pytest.mark.parametrize(("off", "said"), [(65.0, False), (90.0, True)])
+def test_a_ship_that_drifts_has_no_heading_from_another_axis(off, said):
+    """It turns slowly, screw ahead, and goes 65 deg off its bow, as the wind sets it; 90 deg off is
+    a heading counted from another axis."""
+    made = sailed(
+        900.0, lambda t: R(0.6) * np.sin(0.02 * t),
+        lambda t: math.cos(R(off)) * (0.4 + 0.05 * np.sin(0.03 * t)),
+        lambda t: math.sin(R(off)) * (0.4 + 0.05 * np.sin(0.03 * t)),
+        drives={"rudder": lambda t: 0.1 * np.sin(0.02 * t), "propeller": lambda t: 1.5 + 0 * t},
+    )  # fmt: skip
+    p = profile("ned", length=3.0)
+    found = contradictions.find(table(measured(made, "ned", noise=FINE), p), p).findings
+    assert any("another axis" in one.sentence for one in found) == said

@@ -33,7 +33,9 @@ MOSTLY = 0.75  # of the time under way; the ship coasts for the rest
 FAST_FROUDE = 0.15  # U/√(g L): a ship that goes so fast goes where its bow points, or astern
 APART_WAY = 0.8  # share of the way that a heading leaves unexplained: they have nothing in common
 FEWEST_WINDOWS = 20
-BEAM_DEG = (60.0, 120.0)
+# Of the way from the bow, of a heading that is counted from another axis: 90 deg, and what leeway
+# or an antenna add to it. A ship that drifts may go 65 deg off its bow for a whole voyage.
+BEAM_DEG = (75.0, 105.0)
 
 
 def driven(t: Track, e: Evidence) -> list[Driven]:
