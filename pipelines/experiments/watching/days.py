@@ -41,7 +41,6 @@ from shiplog.voyages.store.store import Store
 FIRST = 400_000  # hours after FIRST_DAY of the first voyage, and its seed
 VOYAGE_S, PAUSE_S, AT_ONCE_S = 14_400.0, 1800.0, 1800.0
 EVERY_S = 3600.0
-LATER = 2**62  # ns: a time at which all messages have come
 
 
 def voyage(ship: Ship, number: int) -> tuple[list[Frames], dict[str, dict[str, str]]]:
@@ -105,7 +104,7 @@ def hours(watch: Watch) -> Iterator[tuple[float, float]]:
     """Hours of rows so far, and memory then [MB]."""
     rows, said = 0, 0.0
     while not watch.done:
-        for event in watch.step(LATER):
+        for event in watch.step(sailing.LATER):
             final = getattr(event, "final", None)
             rows += 0 if final is None else final.height
         if rows * 0.1 - said >= EVERY_S:

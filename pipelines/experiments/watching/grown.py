@@ -41,7 +41,6 @@ from shiplog.voyages.samples import fields_read
 
 AT_ONCE_S = 10.0  # s of the voyage that the file grows by
 CHUNK_BYTES = 8192  # of the log, so that a recorder hands over some seconds at a time
-LATER = 2**62  # ns: a time at which all messages have come
 
 
 @dataclass
@@ -77,10 +76,10 @@ def watched(
         for at in range(0, len(content), piece):
             stream.write(content[at : at + piece])
             stream.flush()
-            said += notices(list(watch.step(LATER)))
+            said += notices(list(watch.step(sailing.LATER)))
             while watch.busy:
-                said += notices(list(watch.step(LATER)))
-    said += notices(list(watch.finish(LATER)))
+                said += notices(list(watch.step(sailing.LATER)))
+    said += notices(list(watch.finish(sailing.LATER)))
     first = watch.rows.anchor or 0
     times = (np.array(watcher.times, np.int64) - first) / SECOND_NS
     return times, np.stack(watcher.products), len(said)

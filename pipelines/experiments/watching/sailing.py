@@ -33,6 +33,7 @@ from shiplog.voyages.samples import sampling
 
 FIRST_DAY = datetime(2026, 6, 1, tzinfo=UTC)
 LEG_S = 1800.0  # s of one weather, as a voyage of the campaigns lasts
+LATER = 2**62  # ns: a time at which all messages have come
 
 
 @dataclass(frozen=True)

@@ -28,8 +28,6 @@ from shiplog.live.sources.base import Source
 from shiplog.training.runs import load_model
 from shiplog.training.runs.load_model import Run
 
-LATER = 2**62  # ns: a time at which all messages have come
-
 
 def live(run: Run, of: Nominal, source: Source, watcher: Watcher) -> tuple[list[float], list[int]]:
     """The statistic of each segment, and the numbers of those that raised an alarm."""
@@ -37,12 +35,12 @@ def live(run: Run, of: Nominal, source: Source, watcher: Watcher) -> tuple[list[
     statistics: list[float] = []
     alarms: list[int] = []
     while not watch.done:
-        for event in watch.step(LATER):
+        for event in watch.step(sailing.LATER):
             if isinstance(event, SegmentDone):
                 statistics.append(event.statistic)
             elif isinstance(event, Alarm) and not event.again:
                 alarms.append(len(statistics) - 1)
-    for event in watch.finish(LATER):
+    for event in watch.finish(sailing.LATER):
         if isinstance(event, SegmentDone):
             statistics.append(event.statistic)
         elif isinstance(event, Alarm) and not event.again:
