@@ -373,6 +373,23 @@ def test_a_force_at_the_place_of_a_unit_that_is_named_is_that_unit(
     assert (found.side_force is not None) == device
 
 
+@pytest.mark.parametrize(("place", "device"), [(1.0, False), (-0.9, False), (1.45, True)])
+def test_a_force_between_the_fenders_next_to_a_contact_is_what_the_contact_leaves(
+    trial, monkeypatch, place, device
+):
+    """A ship of 3 m that a wall pushes off 0.9 m ahead and astern of midship, a place known to
+    0.3 m; a force at the very bow is another one."""
+    monkeypatch.setattr(straight.One, "pushes_within", 0.3)
+    monkeypatch.setattr(straight.One, "orders", lambda cause, profile: frozenset())
+    force = replace(SIDE_THRUST, lever=place, device=1.0)
+    found = verdict(
+        trial, {(DRAG, INTERMITTENT): 1.0, ((), INTERMITTENT): 1e-9}, side_force=force,
+        evidence={(DRAG, INTERMITTENT): 400.0, ((), INTERMITTENT): 300.0},
+    )  # fmt: skip
+    assert (found.verdict, named(found)) == ("named", ["drag"])
+    assert (found.side_force is not None) == device
+
+
 @pytest.mark.parametrize(("size", "word"), [(0.001, "none"), (0.5, "named")])
 def test_a_remainder_that_is_there_only_next_to_traces_is_none(trial, size, word):
     """By itself the change in time is less probable than nothing. Next to a drag that does not

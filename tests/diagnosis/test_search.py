@@ -118,7 +118,7 @@ def test_a_cause_is_weighed_that_is_far_from_linear(monkeypatch):
 class Whole(One):
     """There wholly or not at all."""
 
-    whole = (1.2,)
+    whole = (2.4,)
 
 
 @pytest.mark.parametrize("cause", [One("drag"), Whole("drag")])

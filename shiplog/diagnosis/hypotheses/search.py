@@ -17,9 +17,10 @@ remainder R adds to it. S with R is B with R whose further numbers are zero, so 
 
 and what R could explain for S it would explain for B as well. Once B is banned, they are weighed.
 
-What a cause adds is predicted by its derivative where the hypothesis is linearised (`moves`). Of a
-cause that is there wholly or not at all, such as two actuators exchanged, half is worse than
-nothing, and its derivative says little: it is looked at where it is `whole`, too.
+What a cause adds is predicted by its derivative where the hypothesis is linearised (`moves`). Of
+two actuators exchanged, half is worse than nothing; a wall that pushes the ship off keeps it away.
+Where they are absent the derivative of such causes says little: they are looked at where they are
+`whole`, too.
 """
 
 from __future__ import annotations
@@ -227,8 +228,8 @@ class Search:
             self.weigh((best.name,), best.numbers, table.first)
 
     def _weigh_wholes(self) -> None:
-        """The causes that are there wholly or not at all, each alone, from where it is wholly
-        there: where that explains something, and more than its derivative promises."""
+        """The causes of which a derivative where they are absent says little, each alone, from
+        where it is whole: where that explains something, and more than its derivative promises."""
         table, nothing = self.table, self.table.nothing
         if table.trial.as_nominal:
             return
@@ -237,7 +238,8 @@ class Search:
         for cause in table.catalogue:
             if not cause.whole or self._banned((cause.label,)):
                 continue
-            numbers = {cause.label: np.array(cause.whole)}
+            size = cause.sizes(table.trial.reference.setting)
+            numbers = {cause.label: np.array(cause.whole) * size}
             try:  # about a path of its own: that without the cause is of another ship
                 point = table.trial.linearise(numbers, None, fit.estimate.noise_factor)
             except np.linalg.LinAlgError:

@@ -261,12 +261,17 @@ def device(table: Hypotheses, one: Hypothesis) -> float:
 
 def _at_a_unit_of_a_cause(table: Hypotheses, one: Hypothesis) -> bool:
     """Whether the intermittent force of a hypothesis acts at the place of a recorded unit that can
-    push athwart, and that one of its causes is in: two names for one fault."""
+    push athwart, and that one of its causes is in, or where one of its causes pushes athwart now
+    and then: two names for one fault."""
     if one.side_force is None:
         return False
     profile = table.trial.record.profile
+    length, lever = profile.ship.length_m, abs(one.side_force.lever)
+    within = [table.by[n].pushes_within for n in one.causes if n in table.by]
+    if any(w > 0.0 and lever < (w + SAME_PLACE) * length for w in within):
+        return True
     units = {i for n in one.causes if n in table.by for i in table.by[n].orders(profile) or ()}
-    near = SAME_PLACE * profile.ship.length_m
+    near = SAME_PLACE * length
     return any(
         abs(a.position_m[0] - one.side_force.lever) < near
         for a in (profile.actuators[i] for i in units)

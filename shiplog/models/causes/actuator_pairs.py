@@ -114,7 +114,7 @@ class ActuatorsExchanged(_OnPairs):
     equation = "u₁ = u₂,recorded,  u₂ = u₁,recorded"
     remedy = "Exchange their two names in the profile, and ingest these logs again."
     parameters = (Parameter("share", "1", 1.0, 0.5, low=-0.5, high=1.5),)
-    whole = (1.0,)
+    whole = (1.0,)  # half of an exchange is worse than none
     separated_by = {"actuator_coupling": "one unit at a time, the other at zero"}
 
     @property

@@ -181,9 +181,11 @@ class Cause:
     # Of a reading that is linearised where the cause is absent: its step, in realistic sizes; 0 for
     # that of every other one. A limit that is far away changes nothing.
     first_step: ClassVar[float] = 0.0
-    # Numbers of what is there wholly or not at all: it is looked at there, too, since where it is
-    # absent its derivative says little of it.
+    # Of a cause whose derivative where it is absent says little of it: its numbers, in realistic
+    # sizes, at which it is looked at, too.
     whole: ClassVar[tuple[float, ...]] = ()
+    # Lengths ahead and astern of midship, between which its force pushes athwart now and then.
+    pushes_within: ClassVar[float] = 0.0
     unit_error: ClassVar[float] = 0.0  # share by which the unit of its numbers may be wrong
     form_error: ClassVar[float] = 0.0  # share of its force that its equations may leave wrong
     drifts: ClassVar[bool] = False  # it grows with time: it has a slope, and no onset

@@ -67,6 +67,9 @@ class Contact(Cause):
     }
     form_error = COARSE
     unit_error = INERTIA
+    # Pushed off, the ship no longer comes so near: friction and reach of no force are no number.
+    whole = (1.0, 1.0, 0.0)
+    pushes_within = SHOULDER
 
     @property
     def nominal(self) -> bool:
