@@ -11,6 +11,7 @@ from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.hypotheses import fits
 from shiplog.diagnosis.hypotheses.unrecorded_thruster import SideForce
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED
+from shiplog.diagnosis.verdict import posterior as posteriors
 from shiplog.diagnosis.verdict.decide import decide
 from shiplog.diagnosis.verdict.result import PATTERN, REFUTED
 from shiplog.report.diagnosis.sections import causes
@@ -371,6 +372,24 @@ def test_a_force_at_the_place_of_a_unit_that_is_named_is_that_unit(
     )  # fmt: skip
     assert (found.verdict, named(found)) == ("named", ["drag"])
     assert (found.side_force is not None) == device
+
+
+@pytest.mark.parametrize(("more", "names"), [(15.0, ["drag"]), (25.0, ["drag", "load"])])
+def test_a_slight_cause_on_the_unit_of_a_large_one_is_what_that_one_leaves(
+    trial, monkeypatch, more, names
+):
+    """A limit of a screw explains a thousand nats, and 3 % of thrust of the same screw adds 15: a
+    limit is not sharp. With 25 nats more it is a cause by itself."""
+    one_screw = lambda labels, profile: {label: {"propeller"} for label in labels}  # noqa: E731
+    monkeypatch.setattr(posteriors, "_units_of", one_screw)
+    given = {(("drag", "load"), NOMINAL): 0.97, (DRAG, NOMINAL): 0.02, ((), NOMINAL): 1e-9}
+    evidence = {(("drag", "load"), NOMINAL): 1000.0 + more, (DRAG, NOMINAL): 1000.0}
+    found = verdict(trial, given, evidence=evidence)
+    assert named(found) == names
+    assert ("whose equations may leave as much" in found.rejected.get("load", "")) == (more < 20.0)
+    # on units of their own they are two causes, whatever their sizes
+    monkeypatch.setattr(posteriors, "_units_of", lambda labels, _: {n: {n} for n in labels})
+    assert named(verdict(trial, given, evidence=evidence)) == ["drag", "load"]
 
 
 @pytest.mark.parametrize(("place", "device"), [(1.0, False), (-0.9, False), (1.45, True)])

@@ -97,6 +97,7 @@ def main() -> None:
 
 
 def keep(given: argparse.Namespace) -> None:
+    given.kept.mkdir(parents=True, exist_ok=True)
     there = {s: segments_kept.campaign_of(given.ships / s.name) for s in sailing.FIVE}
     maps = {s: segment_products.directions(of.campaign) for s, of in there.items()}
     runs: dict[Ship, Run] = {s: load_model.load(given.ships / s.name / "base") for s in there}

@@ -24,6 +24,9 @@ CONTENDERS = 3  # causes that are tried from one hypothesis
 # nats of the best addition, up to which all are looked at from nearer: on the Esso Osaka with its
 # published coefficients a derivative promised from 50 too few to 80 too many
 CLOSE_CALL = 200.0
+# Realistic sizes that a fit may start from, besides the number of a secant: of a limit, what is
+# larger than any order changes nothing, and what is too small is another ship.
+STARTS = (0.25, 0.5, 1.0)
 
 Addition = tuple[tuple[str, ...], dict[str, np.ndarray], float]
 
@@ -80,6 +83,19 @@ def value(
     return evidence.level(
         table.trial, point, fit.estimate.noise_factor, causes, fit.remainder
     ).value  # fmt: skip
+
+
+def start_of(
+    table: Hypotheses, fit: Fit, label: str, numbers: Mapping[str, np.ndarray]
+) -> Mapping[str, np.ndarray]:
+    """Numbers of a set to start from, of which one cause is new: that of the most probable of some
+    sizes, where its derivative is that of a first step of its own."""
+    cause = table.by[label]
+    if not cause.first_step or cause.count > 1:
+        return numbers
+    size = cause.sizes(table.trial.reference.setting)
+    tried = [{**numbers, label: x} for x in (numbers[label], *(share * size for share in STARTS))]
+    return max(tried, key=lambda one: _from_nearer(table, fit, one))
 
 
 def reductions(one: Hypothesis) -> list[tuple[tuple[str, ...], dict[str, np.ndarray]]]:

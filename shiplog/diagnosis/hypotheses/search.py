@@ -269,7 +269,8 @@ class Search:
             least = self._least_promise if from_nothing else best - SEARCH_NATS
             worth = first or predicted > least
             if worth and labels not in self._tried and len(self._tried) < self._most:
-                self.weigh(labels, numbers, fit.point)
+                (new,) = set(labels) - set(one.causes)
+                self.weigh(labels, moves.start_of(self.table, fit, new, numbers), fit.point)
         for labels, numbers in moves.reductions(one):
             if labels in self._tried:
                 self._weigh_again(labels, one, fit)

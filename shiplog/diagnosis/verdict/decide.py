@@ -62,6 +62,10 @@ def decide(
     names = () if doubted else found.stated
     stated_kind = found.remainder
     best = posteriors.best_with(found, names, stated_kind if not names else None)
+    left = posteriors.left_by_others(table, best, names)
+    names = tuple(name for name in names if name not in left)
+    if left:
+        best = posteriors.best_with(found, names, best.kind, left)
     fit = table.fit(best)
     p_device = posteriors.device(table, best)
     kind = posteriors.practical_kind(table, best)
@@ -100,7 +104,9 @@ def decide(
         reported = _add_side_force(reported, side_force)
     return Decision(
         verdict=verdict, named=named, structure=structure, side_force=side_force, traces=traces,
-        rejected=_reasons(search, found, refuted | dict(doubted or {}) | in_doubt, named),
+        rejected=_reasons(
+            search, found, refuted | dict(doubted or {}) | in_doubt | left, named
+        ),
         ranking=found.ranking(either, why, p_device),
         fit=reported, nothing=Fit(table.first, table.nothing.estimate, reported.remainder),
         expected=search.expected, one_of=_additional_causes(table, found, best, named),

@@ -20,7 +20,8 @@ with π = NO_CHANGE: P is at least two thirds.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+import re
+from collections.abc import Collection, Container, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +33,7 @@ from shiplog.diagnosis.hypotheses.table import Hypotheses
 from shiplog.diagnosis.noise.remainder import INTERMITTENT, NOMINAL, RAISED
 from shiplog.diagnosis.verdict.result import REFUTED, SIDE_THRUST
 from shiplog.models.causes.base import deviations
+from shiplog.ship_profile.profile import Profile
 
 STOCHASTIC = "stochastic"  # the contract's word for raised process noise
 FAMILY = {RAISED: STOCHASTIC}
@@ -321,10 +323,50 @@ def explain_more(table: Hypotheses, one: Hypothesis, causes: Sequence[str]) -> b
     return alone.evidence > remainder.evidence
 
 
-def best_with(found: Posterior, names: Sequence[str], kind: str | None = None) -> Hypothesis:
-    """The likeliest hypothesis that contains all of these names, each in its likeliest kind; of one
-    kind of remainder where that is given."""
+def left_by_others(table: Hypotheses, one: Hypothesis, names: Sequence[str]) -> dict[str, str]:
+    """Name → why it is none, of those that act on one unit together with another cause c, which
+    explains so much more that its equations may leave it:
+
+        log Z_h - log Z_(h without it) ≤ SLIGHT (log Z_(h without it) - log Z_(h without both))
+    """
+    found: dict[str, str] = {}
+    units = _units_of(one.causes, table.trial.record.profile)
+
+    def without(*labels: str) -> Hypothesis | None:
+        return table.found.get((tuple(n for n in one.causes if n not in labels), one.kind))
+
+    for label in one.causes:
+        rest = without(label)
+        if name_of(label) not in names or rest is None:
+            continue
+        for other in one.causes:
+            neither = without(label, other)
+            if other == label or neither is None or not units[label] & units[other]:
+                continue
+            explained = rest.evidence - neither.evidence
+            if one.evidence - rest.evidence <= thresholds.SLIGHT * explained:
+                found[name_of(label)] = (
+                    f"it adds {one.evidence - rest.evidence:.0f} nats to {explained:.0f} of "
+                    f"{name_of(other)} on the same unit, whose equations may leave as much"
+                )
+    return found
+
+
+def _units_of(labels: Sequence[str], profile: Profile) -> dict[str, set[str]]:
+    """Label → actuators that it ends with: "thrust_loss:port", "actuator_coupling:one/other"."""
+    return {
+        label: set(re.split("[+/]", label.partition(":")[2])) & set(profile.actuator_names)
+        for label in labels
+    }
+
+
+def best_with(
+    found: Posterior, names: Sequence[str], kind: str | None = None, but: Container[str] = ()
+) -> Hypothesis:
+    """The likeliest hypothesis that contains all of these names, each in its likeliest kind, and
+    none of others; of one kind of remainder where that is given."""
     holding = [h for h in found.hypotheses if set(names) <= set(map(name_of, h.causes))]
+    holding = [h for h in holding if not any(name_of(n) in but for n in h.causes)] or holding
     holding = [h for h in holding if kind in (None, h.kind)] or holding
     likeliest = [h for h in holding
                  if set(names) <= {name_of(n) for n in h.causes if found.states(n)}]  # fmt: skip
