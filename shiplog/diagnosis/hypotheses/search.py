@@ -231,8 +231,6 @@ class Search:
         """The causes of which a derivative where they are absent says little, each alone, from
         where it is whole: where that explains something, and more than its derivative promises."""
         table, nothing = self.table, self.table.nothing
-        if table.trial.as_nominal:
-            return
         fit = table.fit(nothing)
         here = moves.value(table, fit.point, fit)
         for cause in table.catalogue:
