@@ -89,9 +89,10 @@ def start_of(
     table: Hypotheses, fit: Fit, label: str, numbers: Mapping[str, np.ndarray]
 ) -> Mapping[str, np.ndarray]:
     """Numbers of a set to start from, of which one cause is new: that of the most probable of some
-    sizes, where its derivative is that of a first step of its own."""
+    sizes, where its derivative is that of a first step of its own. Not where the trial has no
+    greater errors than the nominal voyages: each size costs a linearisation."""
     cause = table.by[label]
-    if not cause.first_step or cause.count > 1:
+    if not cause.first_step or cause.count > 1 or table.trial.as_nominal:
         return numbers
     size = cause.sizes(table.trial.reference.setting)
     tried = [{**numbers, label: x} for x in (numbers[label], *(share * size for share in STARTS))]
