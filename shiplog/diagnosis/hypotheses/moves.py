@@ -87,16 +87,16 @@ def value(
 
 def start_of(
     table: Hypotheses, fit: Fit, label: str, numbers: Mapping[str, np.ndarray]
-) -> Mapping[str, np.ndarray]:
-    """Numbers of a set to start from, of which one cause is new: that of the most probable of some
-    sizes, where its derivative is that of a first step of its own. Not where the trial has no
-    greater errors than the nominal voyages: each size costs a linearisation."""
+) -> np.ndarray | None:
+    """Number of a cause that is new in a set, to start from: the most probable of some sizes, where
+    its derivative is that of a first step of its own; else None. Nor is it asked where the trial
+    has no greater errors than the nominal voyages: each size costs a linearisation."""
     cause = table.by[label]
     if not cause.first_step or cause.count > 1 or table.trial.as_nominal:
-        return numbers
+        return None
     size = cause.sizes(table.trial.reference.setting)
-    tried = [{**numbers, label: x} for x in (numbers[label], *(share * size for share in STARTS))]
-    return max(tried, key=lambda one: _from_nearer(table, fit, one))
+    tried = (numbers[label], *(share * size for share in STARTS))
+    return max(tried, key=lambda x: _from_nearer(table, fit, {**numbers, label: x}))
 
 
 def reductions(one: Hypothesis) -> list[tuple[tuple[str, ...], dict[str, np.ndarray]]]:

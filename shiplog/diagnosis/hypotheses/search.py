@@ -85,6 +85,7 @@ class Search:
         self.scanned: dict[str, float] = {}
         self._most = MOST_SETS
         self._tried: set[tuple[str, ...]] = set()
+        self._starts: dict[str, np.ndarray | None] = {}  # label → number that its fits start from
         self._expanded: set[tuple[tuple[str, ...], str]] = set()
         self._without_remainders: dict[tuple[str, ...], Mapping[str, np.ndarray]] = {}
         self._without_force: set[tuple[str, ...]] = set()
@@ -268,7 +269,11 @@ class Search:
             worth = first or predicted > least
             if worth and labels not in self._tried and len(self._tried) < self._most:
                 (new,) = set(labels) - set(one.causes)
-                self.weigh(labels, moves.start_of(self.table, fit, new, numbers), fit.point)
+                if new not in self._starts:
+                    self._starts[new] = moves.start_of(self.table, fit, new, numbers)
+                if (start := self._starts[new]) is not None:
+                    numbers = {**numbers, new: start}
+                self.weigh(labels, numbers, fit.point)
         for labels, numbers in moves.reductions(one):
             if labels in self._tried:
                 self._weigh_again(labels, one, fit)
