@@ -380,8 +380,7 @@ def test_a_slight_cause_on_the_unit_of_a_large_one_is_what_that_one_leaves(
 ):
     """A limit of a screw explains a thousand nats, and 3 % of thrust of the same screw adds 15: a
     limit is not sharp. With 25 nats more it is a cause by itself."""
-    one_screw = lambda labels, profile: {label: {"propeller"} for label in labels}  # noqa: E731
-    monkeypatch.setattr(posteriors, "_units_of", one_screw)
+    monkeypatch.setattr(posteriors, "_units_of", lambda labels, _: {n: {"screw"} for n in labels})
     given = {(("drag", "load"), NOMINAL): 0.97, (DRAG, NOMINAL): 0.02, ((), NOMINAL): 1e-9}
     evidence = {(("drag", "load"), NOMINAL): 1000.0 + more, (DRAG, NOMINAL): 1000.0}
     found = verdict(trial, given, evidence=evidence)

@@ -50,6 +50,23 @@ def test_the_convention_that_the_log_has_is_found_whatever_the_others_do(true, w
     assert found.loss == 5.0
 
 
+@pytest.mark.parametrize(("scaled", "said"), [(40.0, False), (5.0, True)])
+def test_a_unit_explains_more_than_that_the_rudders_do_nothing(scaled, said):
+    """Rudders that turn too little: read as degrees they hardly move, which leaves 40 of 100, and
+    42 where they stand at zero. Where degrees were recorded the ship is steered by what is left."""
+
+    def losses(cut):
+        rudder = abs(cut.actuator[0, 0, 0])
+        if np.sign(cut.actuator[0, 0]).tolist() != np.sign(ORDERS).tolist() and rudder > 0.0:
+            return np.full(len(cut), 90.0)  # a sign, or an exchange
+        loss = 42.0 if rudder == 0.0 else scaled if rudder < 0.01 else 100.0
+        return np.full(len(cut), loss)
+
+    model = SimpleNamespace(profile=PROFILE, losses=losses)
+    found = sign_conventions.try_conventions(model, windows())
+    assert (found.words == "the rudder's values taken as degrees that are called radians") == said
+
+
 def test_where_all_diverge_the_loss_is_that_of_a_divergence():
     """One of four windows: a quarter of RUNAWAY, and three quarters of 90."""
     found = sign_conventions.try_conventions(simulator(np.ones(3), np.nan), windows())

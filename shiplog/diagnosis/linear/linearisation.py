@@ -34,7 +34,7 @@ RUN_AWAY = 10.0  # expected distances from its measurement, beyond which a path 
 MOST_PULLS = 20  # steps of a path towards its measurement, at most
 PULLED_NATS = 0.5  # gain of a step in any segment: with less, the path has converged
 # The same of a path that was predicted, from which on its numbers were too far from those that it
-# was predicted from. Steps of a fit leave up to 14; a rudder's limit from none, 300 to 5e7.
+# was predicted from. Ordinary steps of four trials left 3 to 14; a rudder's limit, 5e5 to 5e7.
 FAR_NATS = 20.0
 
 

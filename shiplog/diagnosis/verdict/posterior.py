@@ -324,8 +324,8 @@ def explain_more(table: Hypotheses, one: Hypothesis, causes: Sequence[str]) -> b
 
 
 def left_by_others(table: Hypotheses, one: Hypothesis, names: Sequence[str]) -> dict[str, str]:
-    """Name → why it is none, of those that act on one unit together with another cause c, which
-    explains so much more that its equations may leave it:
+    """Name → why it is none, of those names that act on one unit together with another of them,
+    which explains so much more that its equations may leave it:
 
         log Z_h - log Z_(h without it) ≤ SLIGHT (log Z_(h without it) - log Z_(h without both))
     """
@@ -341,7 +341,9 @@ def left_by_others(table: Hypotheses, one: Hypothesis, names: Sequence[str]) -> 
             continue
         for other in one.causes:
             neither = without(label, other)
-            if other == label or neither is None or not units[label] & units[other]:
+            if other == label or neither is None or name_of(other) not in names:
+                continue
+            if not units[label] & units[other]:
                 continue
             explained = rest.evidence - neither.evidence
             if one.evidence - rest.evidence <= thresholds.SLIGHT * explained:

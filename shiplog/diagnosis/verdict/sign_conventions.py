@@ -105,10 +105,14 @@ def try_conventions(
     """
     still = _hold(cut)
     found, handicap = [], {INSTEAD: NEARLY}
+    idle: dict[str, float] = {}  # key → L_idle, which the units of a kind share
     for one in conventions(simulator.profile, cut, read_as):
         loss = mean(simulator, one.windows) * max(still / max(_hold(one.windows), 1e-12), 1.0)
-        if one.idle is not None and loss >= thresholds.TURNED_SIGN * mean(simulator, one.idle):
-            continue
+        if one.idle is not None:
+            if one.key not in idle:
+                idle[one.key] = mean(simulator, one.idle)
+            if loss >= thresholds.TURNED_SIGN * idle[one.key]:
+                continue
         found.append(Tried(one.words, one.key, loss, cause=one.cause))
         if not one.stated:
             handicap[one.words] = UNSTATED
@@ -196,11 +200,12 @@ def _actuator_signs(profile: Profile, cut: Windows, read_as: Profile | None) -> 
                 cause=ActuatorsExchanged.name,
             )  # fmt: skip
         units = {"rudder": ANGLES, "propeller": TURNS}.get(kind, {})
+        still = scaled(0.0) if units else None
         for factor, words in units.items():
             yield Turned(
                 f"the {kind}'s values taken as {words}", scaled(1.0 / factor),
                 f"`unit` of each [[actuators]] of the kind {kind!r}",
-                _stated(words, read_as, "", kind), idle=scaled(0.0),
+                _stated(words, read_as, "", kind), idle=still,
             )  # fmt: skip
 
 

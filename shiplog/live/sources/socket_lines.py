@@ -22,6 +22,7 @@ AGAIN_S = 2.0
 CONNECTED_S = 0.2  # s that a look may wait for a connection
 READ_BYTES = 1 << 16  # of a datagram, or of one read
 MOST_READS = 256  # of one look
+FIRST_LINES = 20  # a server's greeting, satellites in view: they need not say where a ship is
 SUBSCRIBE = {"context": "vessels.self", "subscribe": [{"path": "*", "period": 100}]}
 
 
@@ -66,7 +67,7 @@ class SocketLines:
             self._connect(clock, notes)
         lines = self._lines(clock, notes)
         frames, why = self.text.messages(lines)
-        if why and lines:
+        if why and lines and len(self.text.lines) >= FIRST_LINES:
             notes.append(why)
         return Arrived(frames, tuple(notes), topics=frozenset(self.text.given))
 

@@ -23,7 +23,6 @@ from shiplog.nomenclature.units import SECOND_NS
 KEPT_S = 120.0
 MOST_LINES = 100_000  # of the last KEPT_S: a line of megabits
 LONGEST_LINE = 1 << 16  # bytes: a line without an end is no line
-FIRST_LINES = 20  # a server's greeting, satellites in view: they need not say where a ship is
 JSON_LINE = re.compile(r"^\s*(\d{10,16};[A-Z];|\{)")
 
 
@@ -56,7 +55,7 @@ class TextLines:
             with quietly():
                 series = read([line for _, line in self.lines], self.name)
         except ShiplogError as error:
-            return {}, error.message if len(self.lines) >= FIRST_LINES else ""
+            return {}, error.message
         return self._new(series), ""
 
     def _new(self, series: Sequence[Series]) -> dict[str, pl.DataFrame]:
